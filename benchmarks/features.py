@@ -1,0 +1,118 @@
+"""What each feature costs: ns a substep of a world, one thread, 1,024 worlds, balanced.
+
+Each row names the row that it adds to and the difference. A slab has unequal moments of
+inertia. Scenes are as they stand after 1/4 s; a resting cube touches with all samples of a face,
+which is its dearest state. Best of the rounds, which take turns over all scenes, as other work on
+the machine can only add time.
+"""
+
+from collections.abc import Callable, Iterator
+
+from benchmarks.report import Cell, Table, main, take_turns
+from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
+from physics.scene import Static, Vector
+
+WORLDS = 1024
+FRAME = 0.04  # s
+ROUNDS, SECONDS = 5, 0.3
+
+SMOOTH, ROUGH = Material(friction=0.0), Material(friction=0.5)
+CUBE, SLAB = Box((0.02, 0.02, 0.02)), Box((0.02, 0.02, 0.015))
+AHEAD = 0.02 + 0.015  # m, where a finger of 15 mm radius touches the cube's side
+
+
+def _cube(
+    material: Material = ROUGH, shape: Box = CUBE, finger: Vector | None = None, cubes: int = 1
+) -> Scene:
+    """Blocks on the ground, stacked, and a finger that stays at a place."""
+    half = shape.half_extents[2]
+    bodies = [
+        Body(shape, mass=0.1, position=(0, 0, (2 * i + 1) * half), material=material)
+        for i in range(cubes)
+    ]
+    drives = [] if finger is None else [Drive(Sphere(0.015), 0.2, 5.0, finger, material=material)]
+    return Scene(bodies, [Ground(material)], drives)
+
+
+def _flying(shape: Box | Sphere, spin: float) -> Scene:
+    """A body alone that spins."""
+    return Scene([Body(shape, mass=0.1, angular_velocity=(spin, 2 * spin, 0))], gravity=(0, 0, 0))
+
+
+def _ball(material: Material) -> Scene:
+    body = Body(Sphere(0.02), mass=0.1, position=(0, 0, 0.02), material=material)
+    return Scene([body], [Ground(material)])
+
+
+def _two_cubes_apart() -> Scene:
+    bodies = [Body(CUBE, mass=0.1, position=(x, 0, 0.02), material=ROUGH) for x in (-0.1, 0.1)]
+    return Scene(bodies, [Ground(ROUGH)])
+
+
+def _wall() -> Scene:
+    scene = _cube()
+    wall = Static(Box((0.02, 0.2, 0.02)), position=(0.041, 0, 0.02), material=ROUGH)
+    return Scene(scene.bodies, [*scene.statics, wall])
+
+
+# name: what it adds to, scene, fidelity
+CASES: dict[str, tuple[str, Scene, Fidelity]] = {
+    "ball flies": ("", _flying(Sphere(0.02), 0.0), Fidelity()),
+    "cube flies and spins": ("ball flies", _flying(CUBE, 1.0), Fidelity()),
+    "slab flies and spins": (
+        "cube flies and spins",
+        _flying(SLAB, 1.0),
+        Fidelity(),
+    ),
+    "ball rests, no friction": ("ball flies", _ball(SMOOTH), Fidelity()),
+    "ball rests": ("ball rests, no friction", _ball(ROUGH), Fidelity()),
+    "cube rests, no friction": ("cube flies and spins", _cube(SMOOTH), Fidelity()),
+    "cube rests": ("cube rests, no friction", _cube(), Fidelity()),
+    "slab rests": ("cube rests", _cube(shape=SLAB), Fidelity()),
+    "cube rests, linear dashpot": ("cube rests", _cube(), Fidelity(damping="dashpot")),
+    "cube and finger far off": ("cube rests", _cube(finger=(0.2, 0, 0.1)), Fidelity()),
+    "cube and finger that touches": (
+        "cube and finger far off",
+        _cube(finger=(-AHEAD + 1e-4, 0, 0.02)),
+        Fidelity(),
+    ),
+    "cube 1 mm from a wall": ("cube rests", _wall(), Fidelity()),
+    "two cubes apart": ("cube rests", _two_cubes_apart(), Fidelity()),
+    "two cubes stacked": ("two cubes apart", _cube(cubes=2), Fidelity()),
+    "two cubes stacked, particles": (
+        "two cubes stacked",
+        _cube(cubes=2),
+        Fidelity(geometry="particle"),
+    ),
+}
+
+
+def _advance(world: World) -> Callable[[], int]:
+    """A frame a call; counts substeps of all worlds."""
+    substeps = WORLDS * round(FRAME / world.fidelity.substep)
+
+    def frame() -> int:
+        world.advance(FRAME)
+        return substeps
+
+    return frame
+
+
+def measure() -> Iterator[Table]:
+    """All tables of this module."""
+    sides, touching = {}, {}
+    for name, (_, scene, fidelity) in CASES.items():
+        world = World(scene, fidelity, count=WORLDS, threads=1)
+        world.advance(0.25)
+        sides[name], touching[name] = _advance(world), len(world.contacts().overlap)
+    cost = {name: 1e9 / max(found) for name, found in take_turns(sides, ROUNDS, SECONDS).items()}
+    rows: list[list[Cell]] = []
+    for name, (base, _, _) in CASES.items():
+        added = cost[name] - cost[base] if base else None
+        rows.append([name, touching[name], cost[name], added, base or None])
+    columns = ["scene", "contacts", "ns a substep", "more", "than"]
+    yield Table("features", f"One thread, {WORLDS:,} worlds, balanced", columns, rows)
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)

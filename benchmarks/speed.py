@@ -1,0 +1,175 @@
+"""Speed of Push, beside bare MuJoCo in the same run.
+
+Ours is the whole environment: RigidEnvs/Push-v0 by make_vec, 4,096 worlds, dense reward, random
+actions, balanced, with observation, reward and autoreset. The peer is physics alone, no task and
+no Python in the loop: the same cube, ground and finger ball in MuJoCo at 2 ms, 20 steps to an
+environment step, the finger led along paths that random actions take in our own environment, from
+the same starts. Two threads each. Sides take turns; rates are medians of the rounds, and the last
+two columns are the lowest and the highest ratio within a round.
+"""
+
+import argparse
+import statistics
+import subprocess
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import gymnasium as gym
+import numpy as np
+from mujoco import MjData, mjtState, rollout
+from mujoco.batch import Batch
+
+from benchmarks.mujoco_scene import model_of
+from benchmarks.report import THREADS, Cell, Table, against, clocked, main, rate, take_turns
+from physics import PRESETS, World
+from rigid_envs import Runner
+from rigid_envs.tasks import Push
+
+ID = "RigidEnvs/Push-v0"
+WORLDS = 4096
+EPISODE = 50  # environment steps
+SUBSTEPS = 20  # of MuJoCo in an environment step
+PEER = "MuJoCo: rollout"
+ROUNDS, SECONDS = 5, 2.0
+
+Array = np.ndarray
+Side = Callable[[], int]
+
+
+def push(fidelity: str, worlds: int = WORLDS) -> Side:
+    """An episode of the vector environment a call, and the step in which all worlds reset."""
+    envs = gym.make_vec(
+        ID, num_envs=worlds, reward_type="dense", fidelity=fidelity, threads=THREADS
+    )
+    actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, worlds, 3)).astype(np.float32)
+    envs.reset(seed=0)
+
+    def episode() -> int:
+        for action in actions:
+            envs.step(action)
+        envs.step(actions[0])  # the one in which worlds reset: it takes time and doesn't count
+        return EPISODE * worlds
+
+    return episode
+
+
+def push_alone(fidelity: str = "balanced") -> Side:
+    """An episode of the single environment a call, reset included."""
+    env = gym.make(ID, reward_type="dense", fidelity=fidelity)
+    actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, 3)).astype(np.float32)
+
+    def episode() -> int:
+        env.reset()
+        done, steps = False, 0
+        while not done:
+            _, _, terminated, truncated, _ = env.step(actions[steps])
+            done, steps = terminated or truncated, steps + 1
+        return steps
+
+    return episode
+
+
+def episode_of(worlds: int, fidelity: str = "balanced") -> tuple[World, Array, Array, Array]:
+    """An episode of Push under random actions.
+
+    Returns:
+        The world at its end; the cubes' first positions [worlds, 3] and orientations [worlds, 4];
+        and the fingers' paths [worlds, EPISODE + 1, 3] in m.
+    """
+    runner, rng = Runner(Push(), worlds, "dense", fidelity, THREADS), np.random.default_rng(0)
+    runner.reset(np.ones(worlds, dtype=bool), np.arange(worlds))
+    world = runner.world
+    position, orientation = world.position[:, 0].copy(), world.orientation[:, 0].copy()
+    path = [world.drive_position[:, 0].copy()]
+    for _ in range(EPISODE):
+        runner.step(rng.uniform(-1, 1, (worlds, 3)))
+        path.append(world.drive_position[:, 0].copy())
+    return world, position, orientation, np.stack(path, axis=1)
+
+
+def mujoco_sides(worlds: int = 256) -> dict[str, Side]:
+    """An episode a call of mujoco.rollout, and of mujoco.batch that gets a path step by step.
+
+    Fewer worlds than ours: MuJoCo's rate doesn't depend on them, and paths and states stay small.
+    """
+    task = Push()
+    _, position, orientation, path = episode_of(worlds)
+    model = model_of(task.scene(), task.frame / SUBSTEPS, cone="pyramidal")
+    state = np.zeros((worlds, 1 + model.nq + model.nv))
+    state[:, 1:8] = np.hstack([position, np.roll(orientation, 1, axis=1)])
+    share = np.arange(1, SUBSTEPS + 1)[:, None] / SUBSTEPS
+    control = path[:, :-1, None] + share * np.diff(path, axis=1)[:, :, None]
+    control = control.reshape(worlds, EPISODE * SUBSTEPS, 3)
+    room = np.empty((worlds, EPISODE * SUBSTEPS, state.shape[1]))
+    pool, data = rollout.Rollout(nthread=THREADS), [MjData(model) for _ in range(THREADS)]
+    spec = int(mjtState.mjSTATE_MOCAP_POS)
+    batch = Batch(model, nsim=worlds, nthread=THREADS)
+
+    def roll() -> int:
+        pool.rollout(model, data, state, control, control_spec=spec, state=room)
+        return worlds * EPISODE
+
+    def step() -> int:
+        batch.reset()
+        batch.qpos = state[:, 1:8]
+        for frame in range(EPISODE):
+            batch.mocap_pos = path[:, frame + 1, None]
+            batch.step(nstep=SUBSTEPS)
+        return worlds * EPISODE
+
+    return {PEER: roll, "MuJoCo: batch": step}
+
+
+def panda(python: Path) -> list[float]:
+    """Environment steps/s of PandaPush-v3 in each round, in an environment of its own."""
+    script = Path(__file__).parent / "peers" / "panda_push.py"
+    command = [str(python), str(script), str(ROUNDS), str(SECONDS)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return [float(word) for word in printed.splitlines()[-1].split()]
+
+
+def beside_peers(panda_python: Path | None) -> Iterator[Table]:
+    """Batch and single environment against the peers."""
+    sides = {f"{ID}, {WORLDS:,} worlds": push("balanced"), **mujoco_sides()}
+    rates = take_turns({**sides, f"{ID}, gym.make": push_alone()}, ROUNDS, SECONDS)
+    if panda_python:
+        rates["panda-gym: PandaPush-v3"] = panda(panda_python)
+    columns = ["environment steps a second", "median", f"ratio to {PEER}", "lowest", "highest"]
+    yield Table("speed", "Push, balanced, 20 substeps of 2 ms", columns, against(rates, PEER))
+
+
+def by_preset() -> Iterator[Table]:
+    """What each preset costs, where its time goes, and how near its step is to the limit."""
+    rows: list[list[Cell]] = []
+    for preset, fidelity in PRESETS.items():
+        side = push(preset)
+        side()
+        worst, touching, looked_at = np.inf, 0, 64
+        world = episode_of(looked_at, preset)[0]
+        for w in range(looked_at):
+            worst = min(worst, world.largest_stable_step(w))
+            touching += len(world.contacts(w).overlap)
+        start = perf_counter()
+        with clocked(World, "advance") as spent:
+            rates = [rate(side, SECONDS) for _ in range(3)]
+        engine = sum(spent) / (perf_counter() - start)
+        median, substeps = statistics.median(rates), round(Push.frame / fidelity.substep)
+        numbers = [substeps, median, median * substeps, engine, 1.0 - engine]
+        rows.append([preset, *numbers, fidelity.substep / worst, touching / looked_at])
+    columns = ["preset", "substeps", "env steps/s", "substeps/s", "share of engine", "of the task"]
+    columns += ["substep / largest stable", "contacts a world"]
+    yield Table("presets", f"Push by preset, {WORLDS:,} worlds", columns, rows)
+
+
+def measure(panda_python: Path | None = None) -> Iterator[Table]:
+    """All tables of this module."""
+    yield from beside_peers(panda_python)
+    yield from by_preset()
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--panda", type=Path, metavar="PYTHON", help="see benchmarks/peers")
+    main(__doc__, partial(measure, parser.parse_args().panda))

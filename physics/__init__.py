@@ -1,0 +1,31 @@
+"""A rigid-body engine: bodies made of particles, thousands of worlds at once, compiled by numba."""
+
+from physics.diagnostics import Contacts
+from physics.errors import ContactOverflow, SimulationDiverged
+from physics.features import Features
+from physics.fidelity import PRESETS, Fidelity
+from physics.readout import Readout
+from physics.scene import Body, Drive, Ground, Material, Scene, Static
+from physics.shapes import Box, Capsule, Sphere
+from physics.world import Snapshot, World
+
+__all__ = [
+    "PRESETS",
+    "Body",
+    "Box",
+    "Capsule",
+    "ContactOverflow",
+    "Contacts",
+    "Drive",
+    "Features",
+    "Fidelity",
+    "Ground",
+    "Material",
+    "Readout",
+    "Scene",
+    "SimulationDiverged",
+    "Snapshot",
+    "Sphere",
+    "Static",
+    "World",
+]

@@ -1,0 +1,48 @@
+"""Features: what a scene at a fidelity needs compiled in. Derived, never written by hand.
+
+Counts, sizes and material numbers stay out, so that kernels are few and a sweep compiles nothing.
+"""
+
+from typing import NamedTuple
+
+# how bodies turn: not at all; with the same moment about every axis; in general
+NO_ROTATION, ISOTROPIC, GENERAL = range(3)
+
+
+class Features(NamedTuple):
+    """Compile-time switches; each absent one is absent from the machine code and the state.
+
+    Attributes:
+        dashpot: linear damping in place of the one continuous in overlap.
+        friction: any pair has friction: tangential law and history.
+        rotation: NO_ROTATION, ISOTROPIC or GENERAL.
+        plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
+        reaction: a surface belongs to a body or a drive, which feels the opposite force.
+        drives: there are driven tools.
+    """
+
+    dashpot: bool
+    friction: bool
+    rotation: int
+    plane: bool
+    sphere: bool
+    box: bool
+    capsule: bool
+    particles: bool
+    reaction: bool
+    drives: bool
+
+    @property
+    def lane_fields(self) -> int:
+        """Numbers stored for a candidate: sample x y z, weight, impact speed, load, and more."""
+        return 6 + 3 * self.friction + 3 * self.particles
+
+    @property
+    def history_field(self) -> int:
+        """First field of the tangential history x y z."""
+        return 6
+
+    @property
+    def partner_field(self) -> int:
+        """First field of the other body's particle x y z."""
+        return 6 + 3 * self.friction

@@ -1,0 +1,74 @@
+"""Fidelity: the knobs of the trade of speed for accuracy, and its presets."""
+
+from dataclasses import dataclass
+
+from physics.validation import choice, integer, number, positive
+
+LAWS = ("spring",)
+GEOMETRIES = ("shape", "particle")
+DAMPINGS = ("overlap", "dashpot")
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """How finely a scene is simulated.
+
+    Args:
+        law: contact law. "spring": the discrete element method.
+        geometry: "shape": samples of one body against the exact surface of the other, both ways;
+            "particle": spheres against spheres, any shape, never quite a flat face.
+        damping: of the spring law. "overlap": continuous at first touch, restitution independent
+            of where in a step the touch falls; "dashpot": linear, for comparison.
+        substep: s, the longest step of the integrator.
+        collision_substeps: substeps to a collision step; candidates are looked for once in one,
+            and again within it where a body outruns the skin.
+        contact_resolution: omega h of a contact, in rad a substep: the stiffness follows from it as
+            mass (contact_resolution / substep)^2. Smaller is softer: it resolves an impact better
+            and sinks deeper. At most 1.
+        spacing: of samples, as a fraction of a body's smallest width.
+        rounding: of a box's edges, as a fraction of its smallest half width.
+        skin: m at which a sample becomes a candidate, as a fraction of a body's smallest width.
+    """
+
+    law: str = "spring"
+    geometry: str = "shape"
+    damping: str = "overlap"
+    substep: float = 2e-3
+    collision_substeps: int = 5
+    contact_resolution: float = 0.5
+    spacing: float = 0.5
+    rounding: float = 0.025
+    skin: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Checks every field."""
+        choice("Fidelity.law", self.law, LAWS)
+        choice("Fidelity.geometry", self.geometry, GEOMETRIES)
+        choice("Fidelity.damping", self.damping, DAMPINGS)
+        object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
+        integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
+        limits = {
+            "contact_resolution": (1e-4, 1.0),
+            "spacing": (0.01, 1.0),
+            "rounding": (1e-3, 0.5),
+            "skin": (0.01, 1.0),
+        }
+        for name, (low, high) in limits.items():
+            value = number(f"Fidelity.{name}", getattr(self, name), low=low, high=high)
+            object.__setattr__(self, name, value)
+
+
+PRESETS: dict[str, Fidelity] = {
+    "fast": Fidelity(substep=4e-3, spacing=1.0, rounding=0.05),
+    "balanced": Fidelity(),
+    "accurate": Fidelity(substep=0.25e-3, contact_resolution=0.2, spacing=0.25),
+}
+
+
+def resolve(fidelity: "str | Fidelity") -> Fidelity:
+    """The fidelity of a preset's name, or the fidelity itself."""
+    if isinstance(fidelity, Fidelity):
+        return fidelity
+    if isinstance(fidelity, str):
+        return PRESETS[choice("fidelity", fidelity, PRESETS)]
+    raise TypeError(f"fidelity must be one of {list(PRESETS)} or a Fidelity, got {fidelity!r}")

@@ -1,0 +1,94 @@
+"""Mass, centre of mass and inertia: of particle sets, of solids, and of bodies put together.
+
+Inertia tensors are [3, 3], kg m^2, about the centre of mass unless a docstring says otherwise.
+Sources: second lecture, "Mass and Inertia Tensor". Two of its formulas are completed here: the
+offsets of a compound's parts are relative to the common centre, with each part's tensor rotated
+into the common frame; and a set of point particles on a line has a singular tensor, so particles
+may be given a radius, which adds each one's own sphere.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class MassProperties(NamedTuple):
+    """Mass [kg], centre of mass [3] in m, inertia [3, 3] in kg m^2 about that centre."""
+
+    mass: float
+    center: Array
+    inertia: Array
+
+
+def parallel_axis(inertia: Array, mass: float, offset: Array) -> Array:
+    """Inertia [3, 3] about a point `offset` [3] away from the centre of mass (Steiner)."""
+    r = np.asarray(offset, dtype=float)
+    return np.asarray(inertia) + mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
+
+
+def of_particles(positions: Array, masses: Array, radius: float = 0.0) -> MassProperties:
+    """Mass properties of particles.
+
+    Args:
+        positions: [n, 3] m.
+        masses: [n] kg.
+        radius: m; each particle counts as a solid sphere of this radius, 0 for points. A single
+            point, or points on a line, have a singular tensor.
+    """
+    positions = np.asarray(positions, dtype=float)
+    masses = np.asarray(masses, dtype=float)
+    mass = float(masses.sum())
+    center = masses @ positions / mass
+    r = positions - center
+    squares = np.einsum("n,nk,nk->", masses, r, r)
+    inertia = squares * np.eye(3) - np.einsum("n,ni,nj->ij", masses, r, r)
+    return MassProperties(mass, center, inertia + 0.4 * mass * radius**2 * np.eye(3))
+
+
+def combine(
+    parts: Sequence[MassProperties], rotations: Sequence[Array] | None = None
+) -> MassProperties:
+    """Mass properties of several parts as one body.
+
+    Args:
+        parts: each with its centre in the common frame.
+        rotations: [3, 3] each, from the part's frame into the common one; identity if omitted.
+    """
+    mass = sum(part.mass for part in parts)
+    center = sum((part.mass * np.asarray(part.center) for part in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for i, part in enumerate(parts):
+        own = part.inertia if rotations is None else rotations[i] @ part.inertia @ rotations[i].T
+        inertia += parallel_axis(own, part.mass, part.center - center)
+    return MassProperties(mass, center, inertia)
+
+
+def sphere_inertia(mass: float, radius: float) -> Array:
+    """Solid sphere, [3] principal moments."""
+    return np.full(3, 0.4 * mass * radius**2)
+
+
+def box_inertia(mass: float, half_extents: Array) -> Array:
+    """Solid box, [3] principal moments: m/3 (b^2 + c^2) with half extents."""
+    a, b, c = np.square(half_extents)
+    return mass / 3.0 * np.array([b + c, a + c, a + b])
+
+
+def capsule_inertia(mass: float, radius: float, half_length: float) -> Array:
+    """Solid capsule about its z axis, [3] principal moments.
+
+    A cylinder of length 2 l and two half spheres, whose centres of mass lie 3/8 r beyond its ends.
+    """
+    r, half = radius, half_length
+    cylinder = 2.0 * half * r**2
+    caps = 4.0 / 3.0 * r**3
+    cylinder_mass = mass * cylinder / (cylinder + caps)
+    cap_mass = mass * caps / (cylinder + caps)
+    axial = 0.5 * cylinder_mass * r**2 + 0.4 * cap_mass * r**2
+    transverse = cylinder_mass * (r**2 / 4.0 + half**2 / 3.0) + cap_mass * (
+        0.4 * r**2 + half**2 + 0.75 * half * r
+    )
+    return np.array([transverse, transverse, axial])

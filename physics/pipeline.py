@@ -1,0 +1,48 @@
+"""A substep, stage by stage. This file computes nothing: it names what happens, in order."""
+
+from functools import cache
+
+from physics.features import Features
+from physics.jit import stage
+from physics.stages.candidates import make_candidates
+from physics.stages.contacts import make_contacts
+from physics.stages.drives import make_drives
+from physics.stages.gravity import gravity
+from physics.stages.integrator import make_drift, make_kick
+from physics.stages.kinematics import make_kinematics
+
+
+@cache
+def make_forces(features: Features):
+    """The forces at the present positions and half-step velocities, as the stages that add them."""
+    drives = make_drives(features)
+    contacts = make_contacts(features)
+
+    @stage
+    def forces(model, state, frame, rel, rows, w, h, time):
+        gravity(model, state, w)
+        drives(model, state, frame, w, h)
+        contacts(model, state, frame, rel, rows, w, h, time)
+
+    return forces
+
+
+@cache
+def make_substep(features: Features):
+    """One step of the simulation layer."""
+    kick = make_kick(features)
+    drift = make_drift(features)
+    kinematics = make_kinematics(features)
+    candidates = make_candidates(features)
+    forces = make_forces(features)
+
+    @stage
+    def substep(model, state, frame, rel, rows, old, w, h, time):
+        kick(model, state, w, 0.5 * h)
+        drift(model, state, frame, w, h)
+        kinematics(model, state, frame, w)
+        candidates(model, state, frame, rel, old, w)
+        forces(model, state, frame, rel, rows, w, h, time)
+        kick(model, state, w, 0.5 * h)
+
+    return substep

@@ -1,0 +1,1 @@
+"""Scenes with known answers and their closed forms; tests and benchmarks share them."""

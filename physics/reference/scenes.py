@@ -1,0 +1,121 @@
+"""Scenes whose motion has a closed form, and scenes that stand for the tasks.
+
+Gravity is tilted instead of the ground: an incline of angle theta is a level plane on which g has
+the component g sin(theta) along +x.
+"""
+
+import math
+from typing import Any
+
+from physics.fidelity import Fidelity
+from physics.scene import Body, Drive, Ground, Material, Scene, Vector
+from physics.shapes import Box, Capsule, Shape, Sphere
+from physics.world import World
+
+GRAVITY = 9.81  # m/s^2
+CUBE = Box((0.02, 0.02, 0.02))
+BALL = Sphere(0.02)
+FAR_BELOW = -1e3  # m, height of a ground that is never reached
+
+
+def tilted_gravity(angle: float, gravity: float = GRAVITY) -> Vector:
+    """Gravity in m/s^2 on a ground that falls off along +x by `angle` rad."""
+    return (gravity * math.sin(angle), 0.0, -gravity * math.cos(angle))
+
+
+def _on_ground(
+    shape: Shape, height: float, material: Material, gravity: Vector, **body: Any
+) -> Scene:
+    """A body of 0.1 kg with its centre at `height` m over a ground of the same material."""
+    body = {"mass": 0.1, "position": (0.0, 0.0, height), **body}
+    return Scene([Body(shape, material=material, **body)], [Ground(material)], gravity=gravity)
+
+
+def block_on_ground(
+    half_extents: Vector = CUBE.half_extents,
+    friction: float = 0.5,
+    restitution: float = 0.0,
+    angle: float = 0.0,
+    stiffness: float | None = None,
+    **body: Any,
+) -> Scene:
+    """A block of 0.1 kg that stands on a level ground, or on one inclined by `angle` rad."""
+    material = Material(friction, restitution, stiffness)
+    gravity = tilted_gravity(angle)
+    return _on_ground(Box(tuple(half_extents)), half_extents[2], material, gravity, **body)
+
+
+def sphere_on_ground(
+    radius: float = BALL.radius,
+    friction: float = 0.5,
+    restitution: float = 0.0,
+    angle: float = 0.0,
+    gravity: float = GRAVITY,
+    stiffness: float | None = None,
+    **body: Any,
+) -> Scene:
+    """A ball of 0.1 kg that touches the ground, level or inclined by `angle` rad."""
+    material = Material(friction, restitution, stiffness)
+    return _on_ground(Sphere(radius), radius, material, tilted_gravity(angle, gravity), **body)
+
+
+def capsule_on_ground(radius: float = 0.02, half_length: float = 0.03) -> Scene:
+    """A capsule of 0.1 kg that lies on the ground along x."""
+    lying = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
+    material = Material(0.5, 0.0)
+    shape = Capsule(radius, half_length)
+    return _on_ground(shape, radius, material, tilted_gravity(0.0), orientation=lying)
+
+
+def push_like(cube_mass: float = 0.1, force_limit: float = 20.0, friction: float = 0.5) -> Scene:
+    """A cube on the ground and a ball-shaped tool 5 cm behind it along -x."""
+    material = Material(friction, 0.0)
+    return Scene(
+        [Body(CUBE, mass=cube_mass, position=(0.0, 0.0, 0.02), material=material)],
+        [Ground(material)],
+        [Drive(Sphere(0.015), 0.3, force_limit, (-0.05, 0.0, 0.02), material=material)],
+    )
+
+
+def two_cubes(
+    first: dict[str, Any] | None = None,
+    second: dict[str, Any] | None = None,
+    material: Material | None = None,
+    ground: float = FAR_BELOW,
+    gravity: float = 0.0,
+) -> Scene:
+    """Two cubes of 0.1 kg, 6 cm apart along x, by default in free space.
+
+    Args:
+        first: fields of the first Body that differ.
+        second: fields of the second Body that differ.
+        material: of everything.
+        ground: m, height of the ground.
+        gravity: m/s^2.
+    """
+    material = material or Material(0.5, 0.5)
+    bodies = [
+        Body(
+            CUBE,
+            **{"mass": 0.1, "position": (x, 0.0, 0.02), "material": material, **(fields or {})},
+        )
+        for x, fields in ((-0.03, first), (0.03, second))
+    ]
+    return Scene(bodies, [Ground(material, ground)], gravity=(0.0, 0.0, -gravity))
+
+
+def torque_free_box(
+    angular_velocity: Vector = (3.0, 0.0, 5.0), half_extents: Vector = (0.03, 0.02, 0.01)
+) -> Scene:
+    """A box that spins in free space; its moments rise from x to z."""
+    body = Body(Box(tuple(half_extents)), mass=0.1, angular_velocity=angular_velocity)
+    return Scene([body], [Ground(height=FAR_BELOW)], gravity=(0.0, 0.0, 0.0))
+
+
+def settled(
+    scene: Scene, fidelity: str | Fidelity = "balanced", count: int = 1, time: float = 1.0
+) -> World:
+    """Worlds of a scene after `time` s, in which what lies on the ground sinks in and comes to rest."""
+    world = World(scene, fidelity, count)
+    world.advance(time)
+    return world

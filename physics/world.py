@@ -1,0 +1,458 @@
+"""World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics import diagnostics, stability
+from physics.clock import cut, make_advance
+from physics.diagnostics import Contacts
+from physics.errors import ContactOverflow, SimulationDiverged
+from physics.features import ISOTROPIC, NO_ROTATION, Features
+from physics.fidelity import Fidelity, resolve
+from physics.model import Model, build
+from physics.readout import WIDTH, Readout, make_readout
+from physics.rotation import rotate, rotate_back
+from physics.scene import Body, Drive, Scene
+from physics.schedule import check_threads, share_out
+from physics.state import Scratch, State, allocate
+from physics.state import copy as copy_state
+from physics.validation import array, instance, integer, positive
+
+Array = np.ndarray
+
+
+class Snapshot(NamedTuple):
+    """Everything that a world holds, hidden contact state included."""
+
+    features: Features
+    state: State
+
+
+class World:
+    """`count` copies of a scene, advanced together.
+
+    Args:
+        scene: what is in each world.
+        fidelity: a preset's name or a Fidelity.
+        count: number of worlds, at least 1.
+        threads: to share the worlds out over; all cores if None. Results don't depend on it.
+        allow_unstable: accept a Material.stiffness that makes the fidelity's step too long.
+
+    Raises:
+        TypeError, ValueError: a bad argument; a stiffness that the step can't carry, with the body
+            that binds it and the largest safe step.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        fidelity: str | Fidelity = "balanced",
+        count: int = 1,
+        threads: int | None = None,
+        *,
+        allow_unstable: bool = False,
+    ) -> None:
+        """Builds the model and puts every world into the scene's state."""
+        self.scene: Scene = instance("scene", scene, Scene)
+        self.fidelity = resolve(fidelity)
+        self.count = integer("count", count, low=1)
+        self.threads = check_threads(threads)
+        self._bodies = len(scene.bodies)
+        self._model: Model
+        self._model, self._features = build(scene, self.fidelity)
+        self._check_step(allow_unstable)
+        self._scratch = Scratch.of(self._model)
+        self._state = allocate(self._model, self._features, self.count)
+        self._reset(np.ones(self.count, dtype=bool))
+
+    def __repr__(self) -> str:
+        """Names what the world is made of."""
+        return (
+            f"World({self._bodies} bodies, {len(self.scene.drives)} drives, "
+            f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count})"
+        )
+
+    def _check_step(self, allow_unstable: bool) -> None:
+        materials = [x.material for x in (*self.scene.bodies, *self.scene.statics)]
+        materials += [x.material for x in self.scene.drives]
+        given = [m.stiffness for m in materials if m.stiffness is not None]
+        if allow_unstable or not given:
+            return
+        step, body = stability.of_scene(self.scene, self._model, self.fidelity.spacing)
+        if self.fidelity.substep > step:
+            raise ValueError(
+                f"Material.stiffness {max(given):g} N/m makes the substep of "
+                f"{self.fidelity.substep:g} s unstable: body {body} binds, and the largest safe "
+                f"step is {step:.3g} s; lower the stiffness, shorten Fidelity.substep, or pass "
+                "allow_unstable=True"
+            )
+
+    def _reset(self, worlds: Array) -> None:
+        """Puts the chosen worlds into the scene's state, at time zero."""
+        bodies, drives = self.scene.bodies, self.scene.drives
+        state = self._state
+        movers: list[Body | Drive] = [*bodies, *drives]
+        state.mover["position"][worlds] = [m.position for m in movers]
+        state.mover["orientation"][worlds] = [m.orientation for m in movers]
+        state.mover["momentum"][worlds] = 0.0
+        state.mover["angular_momentum"][worlds] = 0.0
+        if bodies:
+            velocity = np.array([b.linear_velocity for b in bodies])
+            spin = np.array([b.angular_velocity for b in bodies])
+            state.mover["momentum"][worlds, : self._bodies] = velocity / self._mass[:, None]
+            turn = np.array([b.orientation for b in bodies])
+            state.mover["angular_momentum"][worlds, : self._bodies] = self._spin_momentum(
+                turn, spin
+            )
+        state.mover["reference"][worlds] = state.mover["position"][worlds]
+        state.mover["reference_velocity"][worlds] = 0.0
+        state.world["time"][worlds] = 0.0
+        self._forget(worlds)
+
+    @property
+    def _mass(self) -> Array:
+        """Inverse masses [bodies]."""
+        return self._model.mover["inverse_mass"][: self._bodies]
+
+    def _spin_momentum(self, orientation: Array, spin: Array) -> Array:
+        """L = R J0 R^T omega, [..., bodies, 3]."""
+        inertia = self._model.mover["inertia"][: self._bodies]
+        return rotate(orientation, inertia * rotate_back(orientation, spin))
+
+    def _forget(self, worlds: Array) -> None:
+        """Clears what is hidden: candidates, contact memories, forces, divergence."""
+        state = self._state
+        state.world["stale"][worlds] = 1
+        state.world["diverged"][worlds] = 0
+        state.side["count"][worlds] = 0
+        state.side["first_touch"][worlds] = np.nan
+        state.world["overflow"][worlds] = 0
+
+    # --- time ---------------------------------------------------------------------------------
+
+    def advance(self, time: float) -> None:
+        """Advances all worlds by `time` s, in whole substeps no longer than the fidelity's.
+
+        Raises:
+            TypeError, ValueError: `time` isn't a positive finite number.
+            SimulationDiverged: a world turned non-finite; the others have advanced and are whole.
+            ContactOverflow: more particle pairs touch than there is room for.
+        """
+        span = positive("time", time)
+        substeps = cut(span, self.fidelity.substep)
+        self._run(span / substeps, substeps)
+
+    def _run(self, h: float, substeps: int) -> None:
+        kernel = make_advance(self._features)
+        model, state, group = self._model, self._state, self.fidelity.collision_substeps
+
+        def run(first: int, last: int) -> int:
+            scratch = self._scratch if self.count == last - first else Scratch.of(model)
+            return int(kernel(model, state, scratch, first, last, h, substeps, group))
+
+        if share_out(run, self.count, self.threads) == 0:
+            return
+        if state.world["diverged"].any():
+            self._raise_diverged(h)
+        worlds = np.flatnonzero(state.world["overflow"]).tolist()
+        raise ContactOverflow(
+            f"worlds {worlds}: two bodies have more than eight touching particle pairs a "
+            "particle; they overlap deeply, or Fidelity.skin is too wide"
+        )
+
+    def _raise_diverged(self, h: float) -> None:
+        worlds = np.flatnonzero(self._state.world["diverged"]).tolist()
+        world = worlds[0]
+        step, body = stability.of_scene(self.scene, self._model, self.fidelity.spacing)
+        if h > step:
+            cause = (
+                f"the substep of {h:g} s is longer than the largest safe one, {step:.3g} s, which "
+                f"body {body} sets"
+            )
+        else:
+            cause = "a state, speed or force too large for double precision"
+        raise SimulationDiverged(
+            world,
+            int(self._state.world["diverged"][world]) - 1,
+            float(self._state.world["time"][world]),
+            cause,
+            worlds,
+        )
+
+    def _settle(self) -> None:
+        """Brings candidates and forces up to a state that was set from outside."""
+        if self._state.world["stale"].any():
+            self._run(self.fidelity.substep, 0)
+
+    # --- reading ------------------------------------------------------------------------------
+
+    def _read(self, values: Array) -> Array:
+        view = values[:]
+        view.flags.writeable = False
+        return view
+
+    @property
+    def features(self) -> Features:
+        """What was compiled in for this scene."""
+        return self._features
+
+    @property
+    def time(self) -> Array:
+        """[count] s, read-only."""
+        return self._read(self._state.world["time"])
+
+    @property
+    def position(self) -> Array:
+        """[count, bodies, 3] m, centres of mass, read-only."""
+        return self._read(self._state.mover["position"][:, : self._bodies])
+
+    @property
+    def orientation(self) -> Array:
+        """[count, bodies, 4] unit quaternions x y z w, read-only."""
+        return self._read(self._state.mover["orientation"][:, : self._bodies])
+
+    @property
+    def linear_velocity(self) -> Array:
+        """[count, bodies, 3] m/s, world frame."""
+        return self._read(self._state.mover["momentum"][:, : self._bodies] * self._mass[:, None])
+
+    @property
+    def angular_velocity(self) -> Array:
+        """[count, bodies, 3] rad/s, world frame."""
+        momentum = self._state.mover["angular_momentum"][:, : self._bodies]
+        turn = self._state.mover["orientation"][:, : self._bodies]
+        inverse = self._model.mover["inverse_inertia"][: self._bodies]
+        if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
+            return self._read(inverse * momentum)
+        return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
+
+    @property
+    def drive_position(self) -> Array:
+        """[count, drives, 3] m, read-only."""
+        return self._read(self._state.mover["position"][:, self._bodies :])
+
+    @property
+    def drive_velocity(self) -> Array:
+        """[count, drives, 3] m/s, world frame."""
+        inverse = self._model.mover["inverse_mass"][self._bodies :]
+        return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
+
+    def read(self) -> Readout:
+        """A copy of all poses and velocities, drives after the bodies, in one pass."""
+        rows = np.empty((self.count, len(self._model.mover), WIDTH))
+        make_readout(self._features)(self._model, self._state, rows)
+        return Readout(rows)
+
+    def kinetic_energy(self) -> Array:
+        """[count] J of the bodies, translation and rotation."""
+        momentum = self._state.mover["momentum"][:, : self._bodies]
+        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._mass)
+        angular = self._state.mover["angular_momentum"][:, : self._bodies]
+        rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
+        return 0.5 * (translation + rotation)
+
+    def potential_energy(self) -> Array:
+        """[count] J of the bodies in the field of gravity, zero at the origin."""
+        weight = self._model.mover["weight"][: self._bodies]
+        return -np.einsum("wbi,bi->w", self._state.mover["position"][:, : self._bodies], weight)
+
+    def linear_momentum(self) -> Array:
+        """[count, 3] kg m/s of the bodies."""
+        return self._state.mover["momentum"][:, : self._bodies].sum(axis=1)
+
+    def angular_momentum(self) -> Array:
+        """[count, 3] kg m^2/s of the bodies about the origin."""
+        bodies = slice(0, self._bodies)
+        orbital = np.cross(
+            self._state.mover["position"][:, bodies], self._state.mover["momentum"][:, bodies]
+        )
+        return (orbital + self._state.mover["angular_momentum"][:, bodies]).sum(axis=1)
+
+    def penetration(self) -> Array:
+        """[count] m, deepest overlap now; 0 where nothing touches."""
+        self._settle()
+        return diagnostics.penetration(self._model, self._features, self._state)
+
+    def contacts(self, world: int = 0) -> Contacts:
+        """Who touches what in one world, where and how hard."""
+        self._settle()
+        return diagnostics.contacts(
+            self._model, self._features, self._state, self._world_index(world)
+        )
+
+    def first_touch(self, first: int, second: int) -> Array:
+        """[count] s, when two solids first touched since their state was set; NaN before.
+
+        Args:
+            first: index of a solid: bodies, then drives, then statics, each in scene order.
+            second: another.
+        """
+        ends = {integer("first", first, low=0), integer("second", second, low=0)}
+        sides = [
+            k
+            for k, side in enumerate(self._model.side)
+            if {int(side["owner"]), int(side["surface"])} == ends
+        ]
+        if not sides:
+            raise ValueError(f"solids {first!r} and {second!r} never meet in this scene")
+        return np.fmin.reduce(self._state.side["first_touch"][:, sides], axis=1)
+
+    def largest_stable_step(self, world: int = 0) -> float:
+        """Largest stable step in s with the contacts that a world has now; inf without any."""
+        self._settle()
+        return stability.of_contacts(
+            self._model, self._features, self._state, self._world_index(world)
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of state a world, beyond the shared model."""
+        return self._state.nbytes // self.count
+
+    def _world_index(self, world: int) -> int:
+        index = integer("world", world, low=0)
+        if index >= self.count:
+            raise ValueError(f"world must be below {self.count}, got {world!r}")
+        return index
+
+    # --- writing ------------------------------------------------------------------------------
+
+    def _mask(self, worlds: Any) -> Array:
+        if worlds is None:
+            return np.ones(self.count, dtype=bool)
+        mask = np.asarray(worlds)
+        if mask.dtype != bool or mask.shape != (self.count,):
+            raise ValueError(
+                f"worlds must be a mask of bools of shape ({self.count},), got {mask.dtype} of "
+                f"shape {mask.shape}"
+            )
+        return mask
+
+    def reset(self, worlds: Any = None) -> None:
+        """Puts worlds back into the scene's state at time zero; all of them, or a mask [count]."""
+        self._reset(self._mask(worlds))
+
+    def set_state(
+        self,
+        *,
+        position: Any = None,
+        orientation: Any = None,
+        linear_velocity: Any = None,
+        angular_velocity: Any = None,
+        drive_position: Any = None,
+        drive_velocity: Any = None,
+        time: Any = None,
+        worlds: Any = None,
+    ) -> None:
+        """Writes any part of the state of the chosen worlds, and clears what is hidden in them.
+
+        Args:
+            position: m; [chosen, bodies, 3] or what broadcasts to it, as the others.
+            orientation: [chosen, bodies, 4] quaternions x y z w; they are normalised.
+            linear_velocity: m/s, [chosen, bodies, 3].
+            angular_velocity: rad/s, world frame, [chosen, bodies, 3].
+            drive_position: m, [chosen, drives, 3].
+            drive_velocity: m/s, [chosen, drives, 3].
+            time: [chosen] s.
+            worlds: mask [count] of the chosen worlds; all if None.
+
+        Raises:
+            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero. The
+                state is then as it was.
+        """
+        mask = self._mask(worlds)
+        chosen, bodies = int(mask.sum()), self._bodies
+        drives = len(self.scene.drives)
+        sizes = {
+            "position": (bodies, 3),
+            "orientation": (bodies, 4),
+            "linear_velocity": (bodies, 3),
+            "angular_velocity": (bodies, 3),
+            "drive_position": (drives, 3),
+            "drive_velocity": (drives, 3),
+            "time": (),
+        }
+        given = {
+            "position": position,
+            "orientation": orientation,
+            "linear_velocity": linear_velocity,
+            "angular_velocity": angular_velocity,
+            "drive_position": drive_position,
+            "drive_velocity": drive_velocity,
+            "time": time,
+        }
+        new = {
+            name: array(name, value, (chosen, *sizes[name]))
+            for name, value in given.items()
+            if value is not None
+        }
+        if "orientation" in new:
+            length = np.sqrt(np.sum(new["orientation"] ** 2, axis=-1, keepdims=True))
+            if np.any(length < 1e-12):
+                raise ValueError(
+                    "orientation holds a quaternion of length zero; no rotation is (0, 0, 0, 1)"
+                )
+            new["orientation"] = new["orientation"] / length
+        spins = np.any(new.get("angular_velocity", 0.0))
+        if self._features.rotation == NO_ROTATION and spins:
+            raise ValueError(
+                "angular_velocity must be zero in a scene of frictionless balls at rest, where "
+                "rotation isn't simulated; give a body its spin in the Scene"
+            )
+        state = self._state
+        # what isn't given stays: the spin, not its momentum, where only the orientation changes
+        spin = new.get("angular_velocity")
+        if spin is None and "orientation" in new:
+            spin = self.angular_velocity[mask]
+        if "position" in new:
+            state.mover["position"][mask, :bodies] = new["position"]
+        if "orientation" in new:
+            state.mover["orientation"][mask, :bodies] = new["orientation"]
+        if "linear_velocity" in new:
+            state.mover["momentum"][mask, :bodies] = new["linear_velocity"] / self._mass[:, None]
+        if spin is not None:
+            turn = state.mover["orientation"][mask, :bodies]
+            state.mover["angular_momentum"][mask, :bodies] = self._spin_momentum(turn, spin)
+        if "drive_position" in new:
+            state.mover["position"][mask, bodies:] = new["drive_position"]
+            state.mover["reference"][mask, bodies:] = new["drive_position"]
+            state.mover["reference_velocity"][mask, bodies:] = 0.0
+        if "drive_velocity" in new:
+            inverse = self._model.mover["inverse_mass"][bodies:, None]
+            state.mover["momentum"][mask, bodies:] = new["drive_velocity"] / inverse
+        if "time" in new:
+            state.world["time"][mask] = new["time"]
+        self._forget(mask)
+
+    def command_drives(self, velocity: Any) -> None:
+        """Lets every drive's reference move from where the drive is now, at a velocity.
+
+        Args:
+            velocity: [count, drives, 3] m/s, or what broadcasts to it; it holds until changed.
+        """
+        shape = (self.count, len(self.scene.drives), 3)
+        mover, drives = self._state.mover, slice(self._bodies, None)
+        mover["reference_velocity"][:, drives] = array("velocity", velocity, shape)
+        mover["reference"][:, drives] = mover["position"][:, drives]
+
+    def snapshot(self) -> Snapshot:
+        """Everything the worlds hold; `restore` continues from it to the last bit."""
+        return Snapshot(self._features, copy_state(self._state))
+
+    def restore(self, saved: Snapshot) -> None:
+        """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
+        instance("saved", saved, Snapshot)
+        shapes = [a.shape for a in self._state]
+        if saved.features != self._features or [a.shape for a in saved.state] != shapes:
+            worlds, movers = saved.state.mover.shape
+            raise ValueError(
+                f"saved belongs to another scene, fidelity or count: it holds {worlds} worlds of "
+                f"{movers} movers and {saved.features}; this is {self!r}"
+            )
+        for mine, theirs in zip(self._state, saved.state, strict=True):
+            mine[...] = theirs
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickles the scene, fidelity and state; kernels are found again on loading."""
+        return self.__dict__.copy()

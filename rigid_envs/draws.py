@@ -1,0 +1,36 @@
+"""Random numbers by counter: a draw depends on (seed, episode, index) and on nothing else.
+
+So a world's episodes are the same whatever its neighbours do, and thousands are drawn at once.
+The generator is splitmix64 (Steele, Lea and Flood 2014), used as a hash of the three counters.
+"""
+
+import numpy as np
+
+Array = np.ndarray
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+
+
+def _mix(x: Array) -> Array:
+    """splitmix64's finaliser: every bit of the input changes half the bits of the output."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+def uniform(seeds: Array, episodes: Array, count: int) -> Array:
+    """Uniform numbers in [0, 1[.
+
+    Args:
+        seeds: [n] non-negative integers.
+        episodes: [n] non-negative integers.
+        count: draws to each.
+
+    Returns:
+        [n, count]
+    """
+    key = _mix(seeds.astype(np.uint64) + _GOLDEN)
+    key = _mix(key + (episodes.astype(np.uint64) + np.uint64(1)) * _GOLDEN)
+    steps = (np.arange(count, dtype=np.uint64) + np.uint64(1)) * _GOLDEN
+    bits = _mix(key[:, None] + steps)
+    return (bits >> np.uint64(11)) * 2.0**-53

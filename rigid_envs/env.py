@@ -1,0 +1,145 @@
+"""One world as a Gymnasium environment."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from physics import Fidelity
+from physics.validation import choice, instance
+from rigid_envs import scene_view
+from rigid_envs.rendering import Renderer
+from rigid_envs.runner import Observation, Runner, check_seed
+from rigid_envs.tasks import Task
+
+Array = np.ndarray
+
+RENDER_MODES = ("rgb_array", "human")
+
+
+class RigidEnv(gym.Env[Observation, Array]):
+    """A task in one world.
+
+    Args:
+        task: a task's name, or a task.
+        reward_type: "sparse": -1 or 0; "dense": shaped.
+        fidelity: "fast", "balanced", "accurate" or a physics.Fidelity.
+        render_mode: None, "rgb_array" or "human".
+        show_forces: draw contact forces.
+        max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
+        terminate_on_success: end an episode when it is solved.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 25}
+
+    def __init__(
+        self,
+        task: str | Task = "push",
+        reward_type: str = "sparse",
+        fidelity: str | Fidelity = "balanced",
+        render_mode: str | None = None,
+        show_forces: bool = False,
+        max_episode_steps: int | None = None,
+        terminate_on_success: bool = False,
+    ) -> None:
+        """Builds the world; an episode begins with `reset`."""
+        if render_mode is not None:
+            choice("render_mode", render_mode, RENDER_MODES)
+        self.render_mode = render_mode
+        self._show_forces: bool = instance("show_forces", show_forces, bool)
+        self._runner = Runner(
+            task, 1, reward_type, fidelity, 1, max_episode_steps, terminate_on_success
+        )
+        self._renderer: Renderer | None = None
+        self.observation_space: Any = self._runner.observation_space
+        self.action_space = self._runner.action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode: the seed's first, or the next one.
+
+        Raises:
+            TypeError, ValueError: a bad seed, an unknown option.
+        """
+        if options:
+            raise ValueError(f"options must be None or empty, got {options!r}")
+        seed = None if seed is None else check_seed("seed", seed)
+        super().reset(seed=seed)
+        if seed is None and not self._runner.seeded:
+            seed = int(self.np_random.integers(2**31))
+        seeds = None if seed is None else np.array([seed])
+        self._runner.reset(np.ones(1, dtype=bool), seeds)
+        observation, info = self._runner.observe()
+        if self.render_mode == "human":
+            self.render()
+        return _first(observation), _first_info(info)
+
+    def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Advances by a frame of 40 ms.
+
+        Raises:
+            ValueError: an action of the wrong shape or with NaN; the state is then as it was.
+            gymnasium.error.ResetNeeded: before the first reset.
+            SimulationDiverged: the state turned non-finite.
+        """
+        if not self._runner.seeded:
+            raise gym.error.ResetNeeded("reset() must be called before step()")
+        action = np.asarray(action)
+        if action.shape != self.action_space.shape:
+            raise ValueError(
+                f"action must have shape {self.action_space.shape}, got {action.shape}: {action!r}"
+            )
+        step = self._runner.step(action[None])
+        if self.render_mode == "human":
+            self.render()
+        return (
+            _first(step.observation),
+            float(step.reward[0]),
+            bool(step.terminated[0]),
+            bool(step.truncated[0]),
+            _first_info(step.info),
+        )
+
+    def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
+        """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""
+        runner = self._runner
+        reward = runner.task.reward
+        return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
+
+    def render(self) -> Array | None:
+        """A frame [480, 480, 3] uint8 in "rgb_array" mode; draws the window in "human" mode."""
+        if self.render_mode is None:
+            gym.logger.warn(
+                'render() needs a render mode: gym.make(..., render_mode="rgb_array") or "human"'
+            )
+            return None
+        if self._renderer is None:
+            self._renderer = Renderer(self.render_mode)
+        return self._renderer.frame(
+            scene_view.items(self._runner, 0),
+            goals=scene_view.goals(self._runner, 0),
+            forces=scene_view.forces(self._runner, 0) if self._show_forces else (),
+        )
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that the episode holds."""
+        return self._runner.get_state()
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Takes the episode back to what `get_state` gave, to the last bit."""
+        self._runner.set_state(state)
+
+    def close(self) -> None:
+        """Closes the window, if any."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def _first(observation: Observation) -> Observation:
+    return {name: values[0] for name, values in observation.items()}
+
+
+def _first_info(info: dict[str, Array]) -> dict[str, Any]:
+    return {name: values[0].item() for name, values in info.items()}

@@ -1,0 +1,18 @@
+"""The environments' ids. Gymnasium 1.x loads no plugins: importing rigid_envs registers them."""
+
+import gymnasium as gym
+
+ENVIRONMENTS = {"RigidEnvs/Push-v0": ("push", 50)}
+
+
+def register() -> None:
+    """Registers every id once."""
+    for name, (task, steps) in ENVIRONMENTS.items():
+        if name not in gym.registry:
+            gym.register(
+                name,
+                entry_point="rigid_envs.env:RigidEnv",
+                vector_entry_point="rigid_envs.vector_env:RigidVectorEnv",
+                max_episode_steps=steps,
+                kwargs={"task": task},
+            )

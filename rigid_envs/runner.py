@@ -1,0 +1,234 @@
+"""The runner: a task on a world of any count. Both kinds of environment are thin adapters to it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+
+from physics import Fidelity, World
+from physics.validation import choice, integer
+from rigid_envs.draws import uniform
+from rigid_envs.rewards import REWARD_TYPES, distance
+from rigid_envs.tasks import TASKS, Task
+
+Array = np.ndarray
+Observation = dict[str, Array]
+
+STATE_VERSION = 1
+# so that a seed plus a world's index is an int64 too
+LARGEST_SEED = 2**62
+
+
+class Step(NamedTuple):
+    """What a step of all worlds gives.
+
+    Attributes:
+        observation: dict of [count, ...] float32.
+        reward: [count].
+        terminated, truncated: [count] bool.
+        info: dict of [count] arrays.
+    """
+
+    observation: Observation
+    reward: Array
+    terminated: Array
+    truncated: Array
+    info: dict[str, Array]
+
+
+class Runner:
+    """Episodes of a task in `count` worlds.
+
+    Args:
+        task: a task's name, or a task.
+        count: number of worlds.
+        reward_type: "sparse" or "dense".
+        fidelity: of the physics.
+        threads: to share the worlds out over; all cores if None.
+        max_episode_steps: truncate after so many steps; never if None.
+        terminate_on_success: end an episode when it is solved.
+    """
+
+    def __init__(
+        self,
+        task: str | Task,
+        count: int,
+        reward_type: str = "sparse",
+        fidelity: str | Fidelity = "balanced",
+        threads: int | None = None,
+        max_episode_steps: int | None = None,
+        terminate_on_success: bool = False,
+    ) -> None:
+        """Builds the world; episodes begin with `reset`."""
+        self.task = task if isinstance(task, Task) else TASKS[choice("task", task, TASKS)]()
+        self.reward_type = choice("reward_type", reward_type, REWARD_TYPES)
+        self.world = World(self.task.scene(), fidelity, count, threads)
+        self.count = count
+        if max_episode_steps is not None:
+            max_episode_steps = integer("max_episode_steps", max_episode_steps, low=1)
+        self.max_episode_steps = max_episode_steps
+        if not isinstance(terminate_on_success, bool | np.bool_):
+            raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
+        self.terminate_on_success = bool(terminate_on_success)
+
+        low, high = _limits(self.task.bounds)
+        goal_low, goal_high = _limits(self.task.goal_bounds)
+        self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
+        self.observation_space = spaces.Dict(
+            {
+                "observation": spaces.Box(low, high, dtype=np.float32),
+                "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+                "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+            }
+        )
+        size = (len(self.task.actions),)
+        self.action_space = spaces.Box(-1.0, 1.0, size, dtype=np.float32)
+
+        self._seeds = np.zeros(count, dtype=np.int64)
+        self._episodes = np.full(count, -1, dtype=np.int64)
+        self._seeded = False
+        self._elapsed = np.zeros(count, dtype=np.int64)
+        self._now = self.world.read()
+        self._apart = np.zeros(count, dtype=np.float32)
+        self._goals = np.zeros((count, len(goal_low)), dtype=np.float32)
+
+    def reset(self, mask: Array, seeds: Array | None = None) -> None:
+        """Starts an episode in the worlds of the mask [count]: their next, or a seed's first.
+
+        Args:
+            mask: [count] bool.
+            seeds: [count] non-negative; a world without a seed so far needs one.
+        """
+        if seeds is not None:
+            self._seeds[mask] = seeds[mask]
+            self._episodes[mask] = -1
+        self._episodes[mask] += 1
+        self._seeded = bool(np.all(self._episodes >= 0))
+        self._elapsed[mask] = 0
+        draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draws)
+        self._goals[mask] = self.task.start(self.world, mask, draws)
+        self._now = self.world.read()
+
+    @property
+    def seeded(self) -> bool:
+        """Whether every world has been reset."""
+        return self._seeded
+
+    @property
+    def goals(self) -> Array:
+        """Desired goals [count, goal]."""
+        return self._goals
+
+    def observe(self) -> tuple[Observation, dict[str, Array]]:
+        """Observation, and what is told beside it: info, [count] each."""
+        now, split = self._now, len(self.task.bounds)
+        values = np.empty((self.count, len(self._low)), dtype=np.float32)
+        self.task.observe(now, values[:, :split])
+        values[:, split:] = self.task.achieved(now)
+        over = (values < self._low) | (values > self._high)
+        if over.any():
+            outside = over.any(axis=1)
+            np.clip(values, self._low, self._high, out=values)
+        else:
+            outside = np.zeros(self.count, dtype=bool)
+        achieved, desired = values[:, split:], self._goals.copy()
+        observation = {
+            "observation": values[:, :split],
+            "achieved_goal": achieved,
+            "desired_goal": desired,
+        }
+        self._apart = apart = distance(achieved, desired)
+        success = np.asarray(self.task.reward.success(apart))
+        terms = self.task.terms(now, achieved, desired, apart)
+        info: dict[str, Array] = {"is_success": success, "success": success}
+        info |= {"out_of_bounds": outside, **terms}
+        return observation, info
+
+    def check_actions(self, actions: Any) -> Array:
+        """Actions [count, actions] within [-1, 1].
+
+        Raises:
+            ValueError: a wrong shape, or NaN; nothing has moved then.
+        """
+        shape = (self.count, len(self.task.actions))
+        try:
+            array = np.asarray(actions, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"action must be numbers of shape {shape}, got {actions!r}") from None
+        if array.shape != shape:
+            raise ValueError(f"action must have shape {shape}, got {array.shape}")
+        total = array.sum()
+        if total != total and np.isnan(array).any():  # the sum alone is the quicker look
+            world, component = (int(i) for i in np.argwhere(np.isnan(array))[0])
+            raise ValueError(
+                f"action must be numbers within [-1, 1], got NaN in world {world}, component "
+                f"{component} ({self.task.actions[component]})"
+            )
+        return np.minimum(np.maximum(array, -1.0), 1.0)
+
+    def step(self, actions: Any) -> Step:
+        """Advances every world by a frame."""
+        self.task.act(self.world, self._now, self.check_actions(actions))
+        self._elapsed += 1  # first, as the other worlds advance even if one of them diverges
+        try:
+            self.world.advance(self.task.frame)
+        finally:
+            self._now = self.world.read()
+        observation, info = self.observe()
+        reward = self.task.reward
+        if self.reward_type == "sparse":
+            rewards = reward.sparse(self._apart)
+        else:
+            rewards = reward.dense(self._apart, info)
+        if self.terminate_on_success:
+            terminated = info["is_success"].copy()
+        else:
+            terminated = np.zeros(self.count, dtype=bool)
+        truncated = info["out_of_bounds"]
+        if self.max_episode_steps is not None:
+            truncated = truncated | (self._elapsed >= self.max_episode_steps)
+        return Step(observation, rewards, terminated, truncated, info)
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that the episodes hold; `set_state` continues from it to the last bit."""
+        return {
+            "version": STATE_VERSION,
+            "world": self.world.snapshot(),
+            "seeds": self._seeds.copy(),
+            "episodes": self._episodes.copy(),
+            "elapsed": self._elapsed.copy(),
+            "goals": self._goals.copy(),
+        }
+
+    def set_state(self, state: Any) -> None:
+        """Takes all episodes back to what `get_state` gave.
+
+        Raises:
+            ValueError: not such a state, another version, or another scene, fidelity or count.
+        """
+        wanted = {"version", "world", "seeds", "episodes", "elapsed", "goals"}
+        if not isinstance(state, dict) or set(state) != wanted:
+            raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
+        if state["version"] != STATE_VERSION:
+            raise ValueError(
+                f"state has version {state['version']!r}, this is version {STATE_VERSION}"
+            )
+        self.world.restore(state["world"])
+        self._now = self.world.read()
+        self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
+        self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]
+        self._seeded = bool(np.all(self._episodes >= 0))
+
+
+def check_seed(field: str, value: Any) -> int:
+    """`value` as a seed."""
+    seed = integer(field, value, low=0)
+    if seed > LARGEST_SEED:
+        raise ValueError(f"{field} must be at most 2**62, got {value!r}")
+    return seed
+
+
+def _limits(bounds: tuple[tuple[str, str, float, float], ...]) -> tuple[Array, Array]:
+    """Low and high [n] of a task's bounds."""
+    low = np.array([b[2] for b in bounds], dtype=np.float32)
+    return low, np.array([b[3] for b in bounds], dtype=np.float32)

@@ -1,0 +1,69 @@
+"""What a task is: everything about an environment but the engine, the episode and Gymnasium."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from physics import Readout, Scene, World
+from rigid_envs.rewards import Reward
+
+Array = np.ndarray
+
+
+class Task(ABC):
+    """A goal-conditioned task on many worlds at once; arrays have a leading world axis.
+
+    Attributes:
+        frame: s of one environment step.
+        actions: names of the action's components, each within [-1, 1].
+        bounds: name, unit, low and high of every component of the observation, in order.
+        goal_bounds: likewise of a goal.
+        draws: random numbers that one episode's start takes.
+        reward: how goals and reward terms make a reward.
+    """
+
+    frame: ClassVar[float] = 1.0 / 25.0
+    actions: ClassVar[tuple[str, ...]]
+    bounds: ClassVar[tuple[tuple[str, str, float, float], ...]]
+    goal_bounds: ClassVar[tuple[tuple[str, str, float, float], ...]]
+    draws: ClassVar[int]
+    reward: Reward
+
+    @abstractmethod
+    def scene(self) -> Scene:
+        """What is in each world."""
+
+    @abstractmethod
+    def start(self, world: World, mask: Array, draws: Array) -> Array:
+        """Puts the worlds of the mask [count] into the start of an episode.
+
+        Args:
+            world: to write to.
+            mask: [count] bool.
+            draws: [chosen, draws] uniform in [0, 1[.
+
+        Returns:
+            [chosen, goal] desired goals.
+        """
+
+    @abstractmethod
+    def act(self, world: World, now: Readout, actions: Array) -> None:
+        """Commands the drives by actions [count, actions] within [-1, 1]."""
+
+    @abstractmethod
+    def observe(self, now: Readout, out: Array) -> None:
+        """Writes observations [count, observation]."""
+
+    @abstractmethod
+    def achieved(self, now: Readout) -> Array:
+        """Achieved goals [count, goal]."""
+
+    @abstractmethod
+    def terms(
+        self, now: Readout, achieved: Array, desired: Array, apart: Array
+    ) -> dict[str, Array]:
+        """Raw reward terms [count] that can't be had from the goals [count, goal] alone.
+
+        `apart` [count] m is the distance of the goals, which every reward needs anyway.
+        """

@@ -1,0 +1,431 @@
+"""Contacts obey the closed forms of rigid bodies: bounce, slide, stick, roll, and never pull."""
+
+import math
+
+import numpy as np
+import pytest
+
+from physics import Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
+from physics.reference import closed_forms, scenes
+from physics.reference.scenes import GRAVITY, settled
+
+PHASES = 100
+SPEED = 1.0
+
+
+def rebound(restitution, fidelity, friction=0.0):
+    """Rebound speeds [100] of a ball at 1 m/s whose touches fall on all phases of a step."""
+    scene = scenes.sphere_on_ground(
+        friction=friction, restitution=restitution, gravity=0.0, linear_velocity=(0, 0, -SPEED)
+    )
+    world = World(scene, fidelity, count=PHASES)
+    position = np.zeros((PHASES, 1, 3))
+    step = world.fidelity.substep * SPEED
+    position[:, 0, 2] = scenes.BALL.radius + step * (2.0 + np.arange(PHASES) / PHASES)
+    world.set_state(position=position)
+    world.advance(0.5)
+    return world.linear_velocity[:, 0, 2]
+
+
+# --- along the normal ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75])
+def test_restitution_is_what_was_asked_for_at_every_phase_of_touch(restitution):
+    errors = np.abs(rebound(restitution, "accurate") - restitution)
+    assert errors.max() <= 1e-3
+
+
+@pytest.mark.parametrize(("fidelity", "tolerance"), [("balanced", 0.02), ("fast", 0.02)])
+@pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75])
+def test_coarse_steps_keep_restitution_within_a_fiftieth(restitution, fidelity, tolerance):
+    assert np.abs(rebound(restitution, fidelity) - restitution).max() <= tolerance
+
+
+def test_without_restitution_a_ball_stays_down():
+    assert np.abs(rebound(0.0, "accurate")).max() <= 1e-3 * SPEED
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "balanced", "accurate"])
+def test_an_elastic_bounce_gains_no_energy(fidelity):
+    speeds = rebound(1.0, fidelity)
+    assert (speeds**2 / SPEED**2 - 1.0).max() <= 1e-3
+    assert speeds.min() >= (0.999 if fidelity == "accurate" else 0.98)
+
+
+def test_friction_changes_nothing_in_a_straight_bounce():
+    np.testing.assert_array_equal(rebound(0.5, "balanced"), rebound(0.5, "balanced", 0.5))
+
+
+@pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75])
+def test_the_dashpot_restitution_is_that_of_the_clamped_spring(restitution):
+    fidelity = Fidelity(substep=0.25e-3, contact_resolution=0.02, damping="dashpot")
+    assert np.abs(rebound(restitution, fidelity, 0.5) - restitution).max() <= 0.02
+
+
+def test_a_bouncing_ball_rises_to_e_squared_of_its_height():
+    drop = 0.5
+    scene = scenes.sphere_on_ground(restitution=0.8, friction=0.0, position=(0, 0, 0.02 + drop))
+    world, heights = World(scene, "accurate"), []
+    falling = math.sqrt(2.0 * drop / GRAVITY)
+    world.advance(falling + 0.8 * falling)
+    np.testing.assert_allclose(world.position[0, 0, 2] - 0.02, 0.8**2 * drop, rtol=5e-3)
+    np.testing.assert_allclose(world.linear_velocity[0, 0, 2], 0.0, atol=0.02)
+
+
+def test_a_contact_lasts_half_a_period_and_sinks_v_over_omega():
+    stiffness, mass, speed = 1e3, 0.1, 0.5
+    scene = scenes.sphere_on_ground(
+        restitution=1.0, friction=0.0, gravity=0.0, stiffness=stiffness,
+        linear_velocity=(0, 0, -speed),
+    )  # fmt: skip
+    world = World(scene, Fidelity(substep=1e-5))
+    times, depths = [], []
+    for _ in range(4000):
+        world.advance(1e-5)
+        depths.append(scenes.BALL.radius - world.position[0, 0, 2])
+        times.append(world.time[0])
+    touching = np.array(depths) > 0.0
+    lasted = touching.sum() * 1e-5
+    assert lasted == pytest.approx(closed_forms.contact_period(mass, stiffness), abs=3e-5)
+    assert max(depths) == pytest.approx(speed * math.sqrt(mass / stiffness), rel=1e-4)
+
+
+@pytest.mark.parametrize(("spacing", "samples"), [(1.0, 8), (0.5, 20), (0.25, 44)])
+def test_a_cube_sinks_as_deep_however_many_samples_it_has(spacing, samples):
+    fidelity = Fidelity(spacing=spacing)
+    world = settled(scenes.block_on_ground(), fidelity)
+    assert world._model.side["sample_count"].tolist() == [samples]
+    stiffness = 0.1 * (fidelity.contact_resolution / fidelity.substep) ** 2
+    sink = closed_forms.resting_overlap(0.1 * GRAVITY, stiffness)
+    assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=1e-6)
+    assert world.penetration()[0] == pytest.approx(sink, rel=1e-6)
+
+
+def test_contacts_never_pull():
+    """Cubes thrown about: every force points out of the ground, within the cone of friction."""
+    rng = np.random.default_rng(0)
+    scene = scenes.block_on_ground(restitution=0.5)
+    world = World(scene, count=40)
+    world.set_state(
+        position=rng.uniform([-1, -1, 0.05], [1, 1, 0.1], (40, 1, 3)),
+        orientation=rng.normal(size=(40, 1, 4)),
+        linear_velocity=rng.uniform(-1, 1, (40, 1, 3)),
+        angular_velocity=rng.uniform(-10, 10, (40, 1, 3)),
+    )
+    seen = 0
+    for _ in range(20):
+        world.advance(0.02)
+        for w in range(40):
+            force = world.contacts(w).force
+            assert np.all(force[:, 2] >= 0.0)
+            sideways = np.hypot(force[:, 0], force[:, 1])
+            assert np.all(sideways <= 0.5 * force[:, 2] * (1 + 1e-9) + 1e-15)
+            seen += len(force)
+    assert seen > 500
+
+
+# --- friction -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("speed", "fidelity", "tolerance"),
+    [
+        (2.0, "balanced", 0.05e-2),
+        (2.0, "accurate", 0.005e-2),
+        (0.5, "balanced", 0.4e-2),
+        (0.5, "accurate", 0.05e-2),
+    ],
+)
+def test_block_stops_after_v_squared_over_two_mu_g(speed, fidelity, tolerance):
+    friction = 0.5
+    world = settled(scenes.block_on_ground((0.04, 0.03, 0.02), friction), fidelity)
+    start = world.position[0, 0, 0]
+    world.set_state(linear_velocity=(speed, 0.0, 0.0))
+    world.advance(speed / (friction * GRAVITY) + 0.5)
+    way = world.position[0, 0, 0] - start
+    expected = closed_forms.slide_distance(speed, friction, GRAVITY)
+    assert way == pytest.approx(expected, rel=tolerance)
+    assert np.abs(world.linear_velocity).max() < 1e-9
+
+
+def test_a_block_slides_straight_in_every_direction():
+    """Friction acts against the velocity, not axis by axis."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    world = settled(scenes.block_on_ground(), count=24)
+    along = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=-1)[:, None]
+    world.set_state(linear_velocity=along)
+    world.advance(0.5)
+    way = world.position[:, 0] - np.array([0.0, 0.0, world.position[0, 0, 2]])
+    distance = np.linalg.norm(way, axis=-1)
+    np.testing.assert_allclose(distance, closed_forms.slide_distance(1.0, 0.5, GRAVITY), rtol=5e-3)
+    np.testing.assert_allclose(way, distance[:, None] * along[:, 0], atol=1e-4)
+
+
+@pytest.mark.parametrize(("fidelity", "time"), [("balanced", 60.0), ("accurate", 5.0)])
+@pytest.mark.parametrize("half_extents", [(0.02, 0.02, 0.02), (0.04, 0.03, 0.02)])
+def test_a_block_on_an_incline_below_the_angle_of_friction_stays(half_extents, fidelity, time):
+    scene = scenes.block_on_ground(half_extents, friction=0.5, angle=math.radians(20.0))
+    world = settled(scene, fidelity)
+    start = world.position.copy()
+    world.advance(time)
+    assert np.linalg.norm(world.position - start) / time < 1e-9
+    assert np.abs(world.linear_velocity).max() < 1e-9
+
+
+@pytest.mark.parametrize("degrees", [30.0, 40.0])
+def test_a_block_on_a_steep_incline_slides_at_g_sin_minus_mu_cos(degrees):
+    friction, angle = 0.3, math.radians(degrees)
+    world = settled(scenes.block_on_ground((0.04, 0.03, 0.02), friction, angle=angle))
+    before = world.linear_velocity[0, 0, 0]
+    world.advance(1.0)
+    gained = world.linear_velocity[0, 0, 0] - before
+    assert gained == pytest.approx(
+        closed_forms.incline_acceleration(angle, friction, GRAVITY), rel=1e-3
+    )
+
+
+def test_without_friction_a_block_slides_on_for_ever():
+    world = settled(scenes.block_on_ground(friction=0.0))
+    world.set_state(linear_velocity=(1.0, 0.5, 0.0))
+    world.advance(5.0)
+    np.testing.assert_allclose(world.linear_velocity[0, 0, :2], (1.0, 0.5), rtol=1e-12)
+
+
+def test_a_sliding_ball_ends_up_rolling_at_five_sevenths():
+    speed, friction = 2.0, 0.3
+    world = settled(scenes.sphere_on_ground(friction=friction))
+    world.set_state(linear_velocity=(speed, 0.0, 0.0))
+    time = closed_forms.rolling_time(speed, friction, GRAVITY)
+    world.advance(0.9 * time)
+    velocity, spin = world.linear_velocity[0, 0, 0], world.angular_velocity[0, 0, 1]
+    assert velocity > 1.05 * spin * 0.02
+    world.advance(0.2 * time + 0.3)
+    velocity, spin = world.linear_velocity[0, 0, 0], world.angular_velocity[0, 0, 1]
+    assert velocity == pytest.approx(closed_forms.rolling_speed(speed), rel=1e-3)
+    assert spin * 0.02 == pytest.approx(velocity, rel=2e-3)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 30.0, 60.0])
+def test_a_ball_rolls_down_an_incline_at_five_sevenths_or_slides(degrees):
+    angle, friction = math.radians(degrees), 0.3
+    world = settled(scenes.sphere_on_ground(friction=friction, angle=angle))
+    before = world.linear_velocity[0, 0, 0]
+    world.advance(1.0)
+    expected = closed_forms.incline_rolling_acceleration(angle, friction, GRAVITY)
+    assert world.linear_velocity[0, 0, 0] - before == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("along", [2.0, 0.5])
+def test_an_oblique_impact_gives_the_spin_of_the_impulse(along):
+    down, friction, restitution, radius = 1.0, 0.2, 0.5, 0.02
+    scene = scenes.sphere_on_ground(
+        radius, friction, restitution, gravity=0.0, position=(0, 0, 0.03),
+        linear_velocity=(along, 0, -down),
+    )  # fmt: skip
+    world = World(scene, "accurate")
+    world.advance(0.5)
+    x, z, spin = closed_forms.oblique_impact(along, down, friction, restitution, radius)
+    if along >= 3.5 * friction * (1 + restitution) * down:
+        assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=1e-3)
+        assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=2e-3)
+    else:  # an elastic tangential spring may store a part of the impulse
+        assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=0.3)
+    assert world.linear_velocity[0, 0, 2] == pytest.approx(z, abs=1e-3)
+
+
+# --- shapes at rest -----------------------------------------------------------------------------
+
+
+def test_a_capsule_lies_still():
+    world = settled(scenes.capsule_on_ground())
+    start = world.position.copy()
+    world.advance(5.0)
+    assert np.abs(world.position - start).max() < 1e-9
+    assert np.abs(world.kinetic_energy()).max() < 1e-15
+    assert 0.0 < world.penetration()[0] < 1e-3
+
+
+def test_a_box_comes_down_on_one_of_its_faces():
+    rng = np.random.default_rng(1)
+    half = np.array([0.02, 0.03, 0.05])
+    world = World(scenes.block_on_ground(tuple(half), restitution=0.2), count=50)
+    world.set_state(
+        position=(0.0, 0.0, 0.2),
+        orientation=rng.normal(size=(50, 1, 4)),
+        angular_velocity=rng.uniform(-10, 10, (50, 1, 3)),
+    )
+    world.advance(10.0)
+    assert world.kinetic_energy().max() < 1e-10
+    off = np.abs(world.position[:, 0, 2, None] - half).min(axis=-1)
+    assert off.max() < 5e-4
+
+
+# --- two bodies ---------------------------------------------------------------------------------
+
+
+def test_a_collision_in_free_space_conserves_momentum_to_round_off():
+    rng = np.random.default_rng(2)
+    world = World(scenes.two_cubes(), count=50)
+    velocity = rng.uniform(-0.3, 0.3, (50, 2, 3))
+    velocity[:, 0, 0], velocity[:, 1, 0] = 1.0, -1.0
+    world.set_state(
+        orientation=rng.normal(size=(50, 2, 4)),
+        linear_velocity=velocity,
+        angular_velocity=rng.uniform(-20, 20, (50, 2, 3)),
+    )
+    linear, angular, energy = (
+        world.linear_momentum(),
+        world.angular_momentum(),
+        world.kinetic_energy(),
+    )
+    before = world.linear_velocity.copy()
+    world.advance(0.2)
+    hit = np.abs(world.linear_velocity - before).max(axis=(1, 2)) > 1e-3
+    assert hit.sum() > 40
+    assert np.abs(world.linear_momentum() - linear).max() < 1e-15
+    assert np.abs(world.angular_momentum() - angular).max() < 1e-16
+    assert np.all(world.kinetic_energy() <= energy * (1 + 1e-3))
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("fidelity", ["balanced", "accurate"])
+def test_two_cubes_that_meet_face_to_face_part_with_e_of_their_speed(restitution, fidelity):
+    scene = scenes.two_cubes(
+        {"linear_velocity": (1.0, 0, 0), "mass": 0.3},
+        {"linear_velocity": (-1.0, 0, 0)},
+        Material(0.5, restitution),
+    )
+    world = World(scene, fidelity)
+    world.advance(0.3)
+    parting = world.linear_velocity[0, 1, 0] - world.linear_velocity[0, 0, 0]
+    assert parting == pytest.approx(2.0 * restitution, abs=0.03 if fidelity == "balanced" else 2e-3)
+    assert np.abs(world.angular_velocity).max() < 1e-9
+
+
+@pytest.mark.parametrize("yaw", [0.0, 45.0])
+def test_a_cube_stands_on_another(yaw):
+    half = math.radians(yaw) / 2
+    scene = scenes.two_cubes(
+        {"position": (0, 0, 0.02)},
+        {"position": (0, 0, 0.06), "orientation": (0, 0, math.sin(half), math.cos(half))},
+        Material(0.5, 0.0),
+        ground=0.0,
+        gravity=GRAVITY,
+    )
+    world = settled(scene)
+    start = world.position.copy()
+    world.advance(10.0)
+    assert np.abs(world.position - start).max() < 1e-6
+    assert world.position[0, 1, 2] > 0.058
+
+
+# --- particle geometry --------------------------------------------------------------------------
+
+PARTICLES = Fidelity(geometry="particle")
+
+
+def test_cubes_of_particles_collide_and_conserve_momentum():
+    rng = np.random.default_rng(3)
+    world = World(scenes.two_cubes(), PARTICLES, count=20)
+    velocity = np.zeros((20, 2, 3))
+    velocity[:, 0, 0], velocity[:, 1, 0] = 1.0, -1.0
+    world.set_state(orientation=rng.normal(size=(20, 2, 4)), linear_velocity=velocity)
+    linear, angular = world.linear_momentum(), world.angular_momentum()
+    energy = world.kinetic_energy()
+    world.advance(0.2)
+    assert np.all(np.abs(world.linear_velocity - velocity).max(axis=(1, 2)) > 0.1)
+    assert np.abs(world.linear_momentum() - linear).max() < 1e-15
+    assert np.abs(world.angular_momentum() - angular).max() < 1e-16
+    assert np.all(world.kinetic_energy() <= energy * (1 + 1e-3))
+
+
+def test_cubes_of_particles_rest_on_the_ground():
+    scene = scenes.two_cubes(material=Material(0.5, 0.0), ground=0.0, gravity=GRAVITY)
+    world = settled(scene, PARTICLES)
+    start = world.position.copy()
+    world.advance(5.0)
+    assert np.abs(world.position - start).max() < 1e-9
+    stiffness = 0.1 * (PARTICLES.contact_resolution / PARTICLES.substep) ** 2
+    np.testing.assert_allclose(0.02 - world.position[0, :, 2], 0.1 * GRAVITY / stiffness, rtol=1e-6)
+
+
+# --- drives -------------------------------------------------------------------------------------
+
+
+def test_a_drive_goes_where_it_is_told():
+    world = World(scenes.push_like())
+    world.command_drives((0.0, 0.2, 0.1))
+    world.advance(0.5)
+    np.testing.assert_allclose(world.drive_velocity[0, 0], (0.0, 0.2, 0.1), atol=1e-6)
+    np.testing.assert_allclose(world.drive_position[0, 0], (-0.05, 0.1, 0.07), atol=1e-5)
+
+
+def test_a_drive_pushes_a_cube_along():
+    world = settled(scenes.push_like())
+    world.command_drives((0.1, 0.0, 0.0))
+    world.advance(2.0)
+    assert world.linear_velocity[0, 0, 0] == pytest.approx(0.1, rel=0.01)
+    gap = world.position[0, 0, 0] - world.drive_position[0, 0, 0]
+    assert gap == pytest.approx(0.02 + 0.015, abs=1e-3)
+    assert world.position[0, 0, 0] > 0.1
+
+
+def test_a_drive_that_is_too_weak_stops_at_a_heavy_block():
+    # friction holds 0.5 * 5 kg * g = 24.5 N, the servo gives 20 N
+    world = settled(scenes.push_like(cube_mass=5.0))
+    start = world.position.copy()
+    world.command_drives((0.3, 0.0, 0.0))
+    world.advance(3.0)
+    assert np.abs(world.position - start).max() < 2e-3
+    assert np.abs(world.drive_velocity).max() < 1e-6
+    assert world.contacts().force[:, 0].sum() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_drive_pushes_no_matter_through_the_ground():
+    world = settled(scenes.push_like(), count=1)
+    world.set_state(drive_position=(0.0, 0.0, 0.06))
+    world.command_drives((0.0, 0.0, -0.5))
+    world.advance(3.0)
+    cube = world.fidelity.contact_resolution / world.fidelity.substep
+    sink = (20.0 + 0.1 * GRAVITY) / (0.1 * cube**2)
+    assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=0.05)
+    assert world.drive_position[0, 0, 2] > 0.04
+
+
+def test_a_drive_itself_stops_at_the_ground():
+    world = World(scenes.push_like())
+    world.command_drives((0.0, 0.0, -0.5))
+    world.advance(3.0)
+    assert world.drive_position[0, 0, 2] > 0.01
+    assert np.abs(world.drive_velocity).max() < 1e-6
+
+
+# --- many kinds of surface ----------------------------------------------------------------------
+
+
+def test_everything_comes_to_rest_on_every_kind_of_surface():
+    from physics import Capsule, Static
+
+    soft = Material(0.8, 0.0)
+    lying = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+    shapes = [Sphere(0.02), Box((0.02, 0.03, 0.02)), Capsule(0.02, 0.03)]
+    floors = [
+        (Box((0.2, 0.2, 0.1)), (0, 0, 0, 1), 0.1),
+        (Sphere(0.5), (0, 0, 0, 1), 0.5),
+        (Capsule(0.3, 0.3), lying, 0.3),
+    ]
+    bodies, statics = [], []
+    for i, (floor, turn, top) in enumerate(floors):
+        statics.append(Static(floor, (2.0 * i, 0.0, -top), turn, soft))
+        for j, shape in enumerate(shapes):
+            height = 0.03 if isinstance(shape, Sphere) else 0.06
+            # on a dome a ball would roll down; one on its top is held by symmetry alone
+            x = 0.1 * (j - 1) if i == 0 else 2.0 * i
+            if i == 0 or j == i:
+                bodies.append(Body(shape, mass=0.1, position=(x, 0.0, height), material=soft))
+    world = World(Scene(bodies, [*statics, Ground(soft, -0.1)]))
+    world.advance(5.0)
+    assert np.all(np.isfinite(world.position))
+    assert np.abs(world.linear_velocity).max() < 1e-3
+    assert 0.0 < world.penetration()[0] < 1e-3

@@ -1,0 +1,88 @@
+"""Rollouts that several files of tests compare."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+import rigid_envs  # noqa: F401  (registers the ids)
+
+PUSH = "RigidEnvs/Push-v0"
+IDS = [PUSH]
+PRESETS = ["fast", "balanced", "accurate"]
+REWARDS = ["sparse", "dense"]
+EPISODE = 50
+
+
+def make(env_id: str = PUSH, **kwargs: Any) -> gym.Env:
+    """The environment itself, in no wrapper."""
+    return gym.make(env_id, **kwargs).unwrapped
+
+
+def make_vec(num_envs: int, env_id: str = PUSH, **kwargs: Any) -> VectorEnv:
+    return gym.make_vec(env_id, num_envs=num_envs, **kwargs)
+
+
+def random_actions(steps: int, worlds: int, seed: int = 0) -> np.ndarray:
+    """[steps, worlds, 3]; the odd worlds hold full actions for ten steps, the others draw anew."""
+    random = np.random.default_rng(seed)
+    actions = random.uniform(-1.0, 1.0, (steps, worlds, 3))
+    full = np.sign(random.uniform(-1.0, 1.0, (-(-steps // 10), worlds, 3))).repeat(10, axis=0)
+    actions[:, 1::2] = full[:steps, 1::2]
+    return actions.astype(np.float32)
+
+
+def toward_cube(observation: dict[str, np.ndarray]) -> np.ndarray:
+    """Actions [..., 3] that run the finger into the cube, so that there are contacts."""
+    return np.clip(20.0 * observation["observation"][..., 19:22], -1.0, 1.0)
+
+
+def push_blindly(observation: dict[str, np.ndarray], noise: np.ndarray) -> np.ndarray:
+    """Actions that depend on every bit of what was seen, and keep touching the cube."""
+    return np.clip(toward_cube(observation) + 0.5 * noise, -1.0, 1.0)
+
+
+def put_cubes_on_goals(env: Any, worlds: np.ndarray | None = None, shift: float = 0.0) -> None:
+    """Solves the chosen worlds, all if None; `shift` m beside the goal."""
+    runner = env._runner
+    worlds = np.ones(runner.count, dtype=bool) if worlds is None else worlds
+    goals = runner.goals[worlds, None].astype(float)
+    runner.world.set_state(position=goals + np.array([shift, 0.0, 0.0]), worlds=worlds)
+
+
+def steps_of(env: gym.Env | VectorEnv, actions: np.ndarray) -> Iterator[tuple[Any, ...]]:
+    for action in actions:
+        yield env.step(action)
+
+
+def one_world(result: tuple[Any, ...], world: int) -> tuple[Any, ...]:
+    """What a vector environment's step, or reset, says of one world, as the single one says it."""
+    *head, info = result
+    told = {k: v[world].item() for k, v in info.items() if not k.startswith(("_", "final"))}
+    return *(_row(part, world) for part in head), told
+
+
+def _row(part: Any, world: int) -> Any:
+    return {k: v[world] for k, v in part.items()} if isinstance(part, dict) else part[world].item()
+
+
+def assert_same(a: Any, b: Any) -> None:
+    """Equal to the last bit, in nested dicts and tuples of arrays and numbers."""
+    if isinstance(a, dict):
+        assert a.keys() == b.keys()
+        for key in a:
+            assert_same(a[key], b[key])
+    elif isinstance(a, tuple | list):
+        assert len(a) == len(b)
+        for x, y in zip(a, b, strict=True):
+            assert_same(x, y)
+    elif isinstance(a, np.ndarray):
+        assert a.dtype == b.dtype
+        if a.dtype == object:
+            return assert_same(a.tolist(), b.tolist())
+        np.testing.assert_array_equal(a, b)
+    else:
+        assert type(a) is type(b)
+        assert a == b

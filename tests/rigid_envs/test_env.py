@@ -1,0 +1,327 @@
+"""The single environment keeps Gymnasium's contract, says what is wrong, and can be copied."""
+
+import copy
+import pickle
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
+
+from physics import Fidelity, SimulationDiverged
+from rigid_envs import RigidEnv, Runner
+from tests.rigid_envs.rollout import (
+    EPISODE,
+    IDS,
+    PRESETS,
+    PUSH,
+    REWARDS,
+    assert_same,
+    make,
+    put_cubes_on_goals,
+    random_actions,
+    steps_of,
+    toward_cube,
+)
+
+pytest.importorskip("pygame")
+ACTIONS = random_actions(EPISODE, 1)[:, 0]
+ZERO = np.zeros(3, dtype=np.float32)
+
+
+@pytest.fixture
+def env():
+    env = make()
+    env.reset(seed=0)
+    yield env
+    env.close()
+
+
+# --- contract -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+@pytest.mark.parametrize("fidelity", PRESETS)
+@pytest.mark.parametrize("reward_type", REWARDS)
+@pytest.mark.parametrize("env_id", IDS)
+@pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
+def test_the_checker_has_nothing_to_say(check, env_id, reward_type, fidelity, render_mode):
+    env = make(env_id, reward_type=reward_type, fidelity=fidelity, render_mode=render_mode)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check(env)
+    env.close()
+
+
+@pytest.mark.parametrize("option", [{"terminate_on_success": True}, {"show_forces": True}])
+@pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
+def test_the_checker_has_nothing_to_say_of_other_options(check, option):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check(make(**option))
+
+
+def test_a_module_prefix_in_the_id_imports_the_package():
+    assert gym.make(f"rigid_envs:{PUSH}").spec.id == PUSH
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_spaces_are_flat_dicts_of_finite_float32_boxes(env_id):
+    env = make(env_id)
+    assert set(env.observation_space) == {"observation", "achieved_goal", "desired_goal"}
+    for space in (*env.observation_space.values(), env.action_space):
+        assert space.dtype == np.float32
+        assert space.is_bounded()
+    assert env.action_space.low.min() == env.action_space.low.max() == -1.0
+    assert env.action_space.high.min() == env.action_space.high.max() == 1.0
+
+
+def test_values_are_plain_python_and_the_info_is_of_one_world(env):
+    _, reward, terminated, truncated, info = env.step(ZERO)
+    assert [type(x) for x in (reward, terminated, truncated)] == [float, bool, bool]
+    assert {name: type(value) for name, value in info.items()} == {
+        "is_success": bool,
+        "success": bool,
+        "out_of_bounds": bool,
+        "reach": float,
+    }
+
+
+def test_an_episode_is_cut_short_after_fifty_steps_through_make():
+    env = gym.make(PUSH)
+    env.reset(seed=0)
+    ends = [(terminated, truncated) for _, _, terminated, truncated, _ in steps_of(env, ACTIONS)]
+    assert ends == [(False, step == EPISODE) for step in range(1, EPISODE + 1)]
+
+
+def test_another_length_can_be_had_through_make():
+    env = gym.make(PUSH, max_episode_steps=7)
+    env.reset(seed=0)
+    assert [step[3] for step in steps_of(env, ACTIONS[:7])] == [False] * 6 + [True]
+
+
+def test_the_environment_can_count_its_own_steps():
+    env = RigidEnv(max_episode_steps=7)
+    for _ in range(2):
+        env.reset(seed=0)
+        assert [step[3] for step in steps_of(env, ACTIONS[:7])] == [False] * 6 + [True]
+
+
+@pytest.mark.parametrize("terminate", [False, True])
+def test_success_ends_an_episode_only_if_asked_to(terminate):
+    env = make(terminate_on_success=terminate)
+    env.reset(seed=0)
+    put_cubes_on_goals(env)
+    _, reward, terminated, truncated, info = env.step(ZERO)
+    assert info["is_success"]
+    assert reward == 0.0
+    assert terminated is terminate
+    assert not truncated
+
+
+def test_success_is_of_the_present_step(env):
+    put_cubes_on_goals(env)
+    assert env.step(ZERO)[4]["is_success"]
+    put_cubes_on_goals(env, shift=0.06)
+    assert not env.step(ZERO)[4]["is_success"]
+
+
+def test_a_cube_that_leaves_the_bounds_truncates_with_the_reason():
+    env = make()
+    env.reset(seed=0)
+    assert not env.step(ZERO)[4]["out_of_bounds"]
+    env._runner.world.set_state(position=[[[1.2, 0.0, 0.02]]])
+    observation, _, terminated, truncated, info = env.step(ZERO)
+    assert info["out_of_bounds"]
+    assert truncated
+    assert not terminated
+    assert env.observation_space.contains(observation)
+    env.reset()
+    assert not env.step(ZERO)[4]["out_of_bounds"]
+
+
+# --- seeds and state ----------------------------------------------------------------------------
+
+
+def rollout(env, actions=ACTIONS):
+    return list(steps_of(env, actions))
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_seed_gives_the_same_episodes_whatever_came_before(fidelity):
+    fresh, used = make(fidelity=fidelity), make(fidelity=fidelity)
+    used.reset(seed=99)
+    for _ in range(EPISODE):
+        observation = used.step(toward_cube(used._runner.observe()[0])[0])[0]
+    assert np.abs(observation["observation"][13:19]).max() > 0.0  # it was pushed
+    for seed in (5, None):  # the seed's first episode, and the one after it
+        assert_same(fresh.reset(seed=seed), used.reset(seed=seed))
+        assert_same(rollout(fresh), rollout(used))
+
+
+def test_other_seeds_and_later_episodes_start_elsewhere(env):
+    starts = [env.reset(seed=0)[0], env.reset(seed=1)[0], env.reset()[0], env.reset()[0]]
+    assert len({start["desired_goal"].tobytes() for start in starts}) == 4
+
+
+def test_without_a_seed_two_environments_differ():
+    first, second = make().reset()[0], make().reset()[0]
+    assert not np.array_equal(first["desired_goal"], second["desired_goal"])
+
+
+def test_saving_and_going_back_repeats_to_the_last_bit(env):
+    rollout(env, ACTIONS[:20])
+    saved = env.get_state()
+    expected = [rollout(env, ACTIONS[20:]), env.reset(), rollout(env)]
+    env.set_state(saved)
+    assert_same([rollout(env, ACTIONS[20:]), env.reset(), rollout(env)], expected)
+
+
+def test_a_saved_state_outlives_later_steps_and_moves_to_another_environment(env):
+    rollout(env, ACTIONS[:20])
+    saved = pickle.loads(pickle.dumps(env.get_state()))
+    expected = rollout(env, ACTIONS[20:])
+    other = make()
+    other.set_state(saved)
+    assert_same(rollout(other, ACTIONS[20:]), expected)
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+def test_a_copy_goes_on_by_itself_to_the_last_bit(clone, render_mode):
+    env = gym.make(PUSH, render_mode=render_mode)
+    env.reset(seed=0)
+    rollout(env, ACTIONS[:20])
+    if render_mode:
+        env.render()
+    twin = clone(env)
+    expected = rollout(env, ACTIONS[20:])
+    assert_same(rollout(twin, ACTIONS[20:]), expected)
+    if render_mode:
+        assert_same(twin.render(), env.render())
+
+
+def test_what_was_returned_is_never_written_to_again(env):
+    first = env.step(ACTIONS[0])
+    kept = copy.deepcopy(first)
+    rollout(env, ACTIONS[1:])
+    env.reset()
+    assert_same(first, kept)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+
+def assert_untouched(env, act, error, match):
+    """`act` raises, and the environment then goes on as if nothing had been."""
+    before = env.get_state()
+    with pytest.raises(error, match=match):
+        act()
+    assert_same(_plain(env.get_state()), _plain(before))
+
+
+def _plain(state):
+    """The state as bytes, for NaN doesn't equal NaN."""
+    world = {f"world {i}": array.tobytes() for i, array in enumerate(state["world"].state)}
+    return {**{k: v for k, v in state.items() if k != "world"}, **world}
+
+
+@pytest.mark.parametrize("component", [0, 1, 2])
+def test_nan_in_an_action_names_world_and_component(env, component):
+    action = ACTIONS[0].copy()
+    action[component] = np.nan
+    match = rf"NaN in world 0, component {component} \(finger {'xyz'[component]}\)"
+    assert_untouched(env, lambda: env.step(action), ValueError, match)
+
+
+@pytest.mark.parametrize(
+    ("action", "match"),
+    [
+        (np.zeros(4), r"shape \(3,\), got \(4,\)"),
+        (np.zeros((1, 3)), r"shape \(3,\), got \(1, 3\)"),
+        (0.0, r"shape \(3,\), got \(\)"),
+        (None, r"shape \(3,\), got \(\): .*None"),
+        (["a", "b", "c"], "action must be numbers"),
+    ],
+)
+def test_an_action_of_the_wrong_kind_is_refused(env, action, match):
+    assert_untouched(env, lambda: env.step(action), ValueError, match)
+
+
+@pytest.mark.parametrize("size", [1.5, 1e30, np.inf])
+def test_actions_out_of_range_are_clipped(size):
+    envs = make(), make()
+    for env in envs:
+        env.reset(seed=0)
+    action = np.array([1.0, -1.0, 0.5])
+    for _ in range(5):
+        expected = envs[0].step(action)
+        assert_same(envs[1].step(np.where(np.abs(action) == 1.0, size * action, action)), expected)
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "match"),
+    [
+        ({"reward_type": "spares"}, ValueError, "reward_type.*did you mean 'sparse'"),
+        ({"reward_type": None}, ValueError, "reward_type must be one of .*got None"),
+        ({"fidelity": "ballanced"}, ValueError, "fidelity.*did you mean 'balanced'"),
+        ({"fidelity": 3}, TypeError, "fidelity must be one of .* or a Fidelity, got 3"),
+        ({"render_mode": "rgb"}, ValueError, "render_mode must be one of .*got 'rgb'"),
+        ({"max_episode_steps": 0}, ValueError, "max_episode_steps must be at least 1, got 0"),
+        ({"max_episode_steps": 1.5}, TypeError, "max_episode_steps must be an integer, got 1.5"),
+        ({"terminate_on_success": 1}, TypeError, "terminate_on_success must be a bool, got 1"),
+        ({"show_forces": "yes"}, TypeError, "show_forces must be bool, got 'yes'"),
+        ({"task": "pusch"}, ValueError, "task.*did you mean 'push'"),
+        ({"task": 1}, ValueError, "task must be one of"),
+    ],
+)
+def test_a_bad_argument_is_named_with_what_would_be_right(kwargs, error, match):
+    with pytest.raises(error, match=match):
+        RigidEnv(**kwargs)
+
+
+def test_any_fidelity_will_do_in_place_of_a_preset():
+    env = make(fidelity=Fidelity(substep=1e-3))
+    env.reset(seed=0)
+    assert np.isfinite(env.step(ACTIONS[0])[1])
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "a", True, 2**63, 2**70], ids=str)
+def test_a_bad_seed_is_refused(env, seed):
+    act = lambda: env.reset(seed=seed)  # noqa: E731
+    assert_untouched(env, act, (TypeError, ValueError), rf"seed must be .*got {seed!r}")
+
+
+def test_options_are_refused_as_there_are_none(env):
+    act = lambda: env.reset(options={"goal": 1})  # noqa: E731
+    assert_untouched(env, act, ValueError, "options must be None or empty, got {'goal': 1}")
+
+
+def test_stepping_before_the_first_reset_is_refused():
+    with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) must be called before step"):
+        make().step(ZERO)
+
+
+@pytest.mark.parametrize("state", [None, {}, 3, {"version": 1}])
+def test_what_is_no_state_is_refused(env, state):
+    assert_untouched(env, lambda: env.set_state(state), ValueError, "state must be a dict with")
+
+
+def test_a_state_of_another_version_fidelity_or_count_is_refused(env):
+    state = {**env.get_state(), "version": 99}
+    assert_untouched(env, lambda: env.set_state(state), ValueError, "version 99, this is version")
+    for other in (Runner("push", 1, fidelity="accurate"), Runner("push", 2)):
+        other.reset(np.ones(other.count, dtype=bool), np.arange(other.count))
+        state = other.get_state()
+        assert_untouched(env, lambda s=state: env.set_state(s), ValueError, "another scene")
+
+
+def test_a_world_that_diverges_says_so_and_starts_anew_with_the_next_reset(env):
+    env._runner.world.set_state(linear_velocity=[[[1e308, 0.0, 0.0]]])
+    with pytest.raises(SimulationDiverged, match=r"world 0: body 0 turned non-finite at t ="):
+        rollout(env)
+    fresh = make()
+    assert_same(env.reset(seed=4), fresh.reset(seed=4))
+    assert_same(rollout(env), rollout(fresh))

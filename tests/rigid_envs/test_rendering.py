@@ -1,0 +1,328 @@
+"""Pictures show what is there: the right colour at the right pixel, the nearer solid in front."""
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from gymnasium.error import DependencyNotInstalled
+
+from physics.shapes import Box, Capsule, Sphere
+from rigid_envs.rendering import TO_LIGHT, Arrow, Camera, Goal, Item, Renderer, grid
+
+pygame = pytest.importorskip("pygame")
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+RED, GREEN, BLUE = (220, 40, 40), (40, 180, 60), (40, 60, 220)
+CUBE = Box((0.02, 0.02, 0.02))
+SIZE = 240
+DOMINANT = {RED: 0, GREEN: 1, BLUE: 2}
+
+
+def item(shape, position, color=RED, orientation=UPRIGHT):
+    return Item(shape, position, orientation, color)
+
+
+def draw(*items, camera=None, **extras):
+    return Renderer("rgb_array", SIZE, SIZE, camera).frame(items, **extras)
+
+
+def pixel_of(point, camera=None):
+    (column, row), _ = (camera or Camera()).project(np.array(point), SIZE, SIZE)
+    return int(row), int(column)
+
+
+def shows(frame, pixel, color):
+    """Whether a pixel has the hue of `color`, however it is lit."""
+    value = frame[pixel].astype(int)
+    others = np.delete(value, DOMINANT[color])
+    return value[DOMINANT[color]] > 1.3 * others.max()
+
+
+def is_grey(frame, pixel):
+    return np.ptp(frame[pixel].astype(int)) < 30
+
+
+def test_a_frame_is_height_by_width_by_three_bytes():
+    frame = Renderer("rgb_array", width=120, height=90).frame([item(CUBE, (0.0, 0.0, 0.02))])
+    assert frame.shape == (90, 120, 3)
+    assert frame.dtype == np.uint8
+
+
+def test_an_empty_scene_shows_the_ground():
+    assert draw().std() > 1.0
+
+
+def test_a_later_frame_leaves_an_earlier_one_alone():
+    renderer = Renderer("rgb_array", SIZE, SIZE)
+    first = renderer.frame([item(CUBE, (0.0, 0.0, 0.02))])
+    kept = first.copy()
+    renderer.frame([item(Sphere(0.1), (0.0, 0.0, 0.1), BLUE)])
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(renderer.frame([item(CUBE, (0.0, 0.0, 0.02))]), kept)
+
+
+def test_the_target_appears_in_the_middle_at_the_camera_distance():
+    camera = Camera(target=(0.3, -0.2, 0.1), distance=0.7, azimuth=25.0, elevation=50.0)
+    pixel, depth = camera.project(np.array(camera.target), 320, 200)
+    np.testing.assert_allclose(pixel, (160.0, 100.0), atol=1e-9)
+    assert depth == pytest.approx(0.7)
+
+
+def test_from_above_the_picture_is_a_map_with_x_right_and_y_up():
+    camera = Camera(distance=2.0, azimuth=-90.0, elevation=90.0, field_of_view=60.0)
+    pixel, _ = camera.project(np.array([0.1, 0.2, 0.0]), 400, 400)
+    per_metre = 200.0 / np.tan(np.radians(30.0)) / 2.0
+    np.testing.assert_allclose(pixel, (200.0 + 0.1 * per_metre, 200.0 - 0.2 * per_metre))
+
+
+@pytest.mark.parametrize("position", [(0.0, 0.0, 0.02), (0.12, 0.1, 0.02), (-0.15, -0.1, 0.1)])
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.02), CUBE, Capsule(0.02, 0.03)], ids=lambda shape: type(shape).__name__
+)
+def test_a_solid_shows_its_colour_at_the_pixel_of_its_centre(shape, position):
+    assert shows(draw(item(shape, position)), pixel_of(position), RED)
+
+
+def test_a_sphere_fills_the_disc_that_the_camera_predicts():
+    camera, radius = Camera(), 0.03
+    frame = draw(item(Sphere(radius), (0.0, 0.0, 0.1)), camera=camera)
+    for direction in (*camera.axes[:2], *-camera.axes[:2]):
+        inside = np.array([0.0, 0.0, 0.1]) + 0.85 * radius * direction
+        outside = np.array([0.0, 0.0, 0.1]) + 1.2 * radius * direction
+        assert shows(frame, pixel_of(inside), RED)
+        assert is_grey(frame, pixel_of(outside))
+
+
+def test_a_turned_box_covers_its_corners():
+    half, angle = np.array([0.08, 0.02, 0.01]), np.radians(35.0)
+    turn = (0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2))
+    frame = draw(item(Box(tuple(half)), (0.0, 0.0, 0.01), orientation=turn))
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    for end in (-1, 1):
+        top = np.array([0.0, 0.0, 0.02])
+        assert shows(frame, pixel_of(top + end * 0.92 * half[0] * along), RED)
+        assert not shows(frame, pixel_of(top + end * 1.2 * half[0] * along), RED)
+
+
+def test_a_capsule_reaches_from_cap_to_cap_along_its_own_z():
+    half = np.sin(np.pi / 4)
+    lying_along_x = (0.0, half, 0.0, half)
+    frame = draw(item(Capsule(0.015, 0.06), (0.0, 0.0, 0.015), orientation=lying_along_x))
+    assert shows(frame, pixel_of((0.07, 0.0, 0.015)), RED)
+    assert shows(frame, pixel_of((-0.07, 0.0, 0.015)), RED)
+    assert not shows(frame, pixel_of((0.09, 0.0, 0.015)), RED)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("near", [Sphere(0.02), CUBE, Capsule(0.015, 0.01)], ids=str)
+@pytest.mark.parametrize("far", [Sphere(0.02), CUBE, Capsule(0.015, 0.01)], ids=str)
+def test_the_nearer_solid_hides_the_farther(near, far, first):
+    towards = Camera().eye / np.linalg.norm(Camera().eye)
+    centre = np.array([0.0, 0.0, 0.1])
+    pair = [item(near, centre + 0.06 * towards, BLUE), item(far, centre)]
+    frame = draw(*(pair if first else pair[::-1]))
+    assert shows(frame, pixel_of(centre), BLUE)
+    assert not shows(frame, pixel_of(centre), RED)
+
+
+def test_a_ball_on_the_far_end_of_a_slab_stays_in_front_of_it():
+    # its centre is farther from the eye than the slab's, so an order by distance would hide it
+    camera = Camera(azimuth=-90.0)
+    slab = item(Box((0.05, 0.2, 0.02)), (0.0, 0.0, 0.02))
+    ball = item(Sphere(0.02), (0.0, 0.12, 0.06), BLUE)
+    assert np.linalg.norm(camera.eye - ball.position) > np.linalg.norm(camera.eye - slab.position)
+    assert shows(draw(ball, slab, camera=camera), pixel_of(ball.position, camera), BLUE)
+
+
+def test_a_finger_behind_a_wall_is_hidden_though_its_centre_is_nearer():
+    camera = Camera(azimuth=-90.0, elevation=5.0)
+    wall = item(Box((0.3, 0.01, 0.1)), (0.28, 0.0, 0.1))
+    finger = item(Sphere(0.015), (0.0, 0.025, 0.05), BLUE)
+    assert np.linalg.norm(camera.eye - finger.position) < np.linalg.norm(camera.eye - wall.position)
+    assert shows(draw(wall, finger, camera=camera), pixel_of(finger.position, camera), RED)
+
+
+def test_a_touching_finger_changes_sides_with_the_camera():
+    cube = item(CUBE, (0.0, 0.0, 0.02))
+    finger = item(Sphere(0.015), (0.0, -0.0345, 0.02), BLUE)  # 0.5 mm deep in the face at -y
+    before = Camera(azimuth=-90.0, elevation=10.0)
+    behind = Camera(azimuth=90.0, elevation=10.0)
+    assert shows(draw(cube, finger, camera=before), pixel_of(finger.position, before), BLUE)
+    assert shows(draw(cube, finger, camera=behind), pixel_of(finger.position, behind), RED)
+
+
+def test_moving_or_turning_a_cube_changes_the_picture():
+    still = draw(item(CUBE, (0.0, 0.0, 0.02)))
+    assert (draw(item(CUBE, (0.01, 0.0, 0.02))) != still).any()
+    assert (draw(item(CUBE, (0.0, 0.0, 0.02), orientation=(0.0, 0.0, 0.38, 0.92))) != still).any()
+
+
+def test_the_shadow_lies_on_the_ground_away_from_the_light():
+    centre = np.array([0.0, 0.0, 0.12])
+    spot = centre - TO_LIGHT * centre[2] / TO_LIGHT[2]
+    dark, plain = draw(item(Sphere(0.03), centre)), draw()
+    row, column = pixel_of(spot)
+    assert dark[row, column].mean() < 0.8 * plain[row, column].mean()
+    mirrored = pixel_of(spot * (-1.0, -1.0, 1.0))
+    np.testing.assert_array_equal(dark[mirrored], plain[mirrored])
+
+
+def test_a_goal_tints_its_disc_and_hangs_a_ball_at_its_height():
+    goal = Goal((0.05, 0.05, 0.15), 0.03, GREEN)
+    frame, plain = draw(goals=[goal]), draw()
+    ball, disc = pixel_of(goal.position), pixel_of((0.04, 0.06, 0.0))
+    beside = pixel_of((0.05, -0.02, 0.0))
+    for pixel in (ball, disc):
+        tint = frame[pixel].astype(int) - plain[pixel]
+        assert tint[1] > max(tint[0], tint[2]) + 15
+    np.testing.assert_array_equal(frame[beside], plain[beside])
+
+
+def test_a_solid_shows_through_the_ball_of_its_goal():
+    position = (0.0, 0.0, 0.02)
+    goal, pixel = Goal(position, 0.05, GREEN), pixel_of(position)
+    alone, solved = draw(goals=[goal]), draw(item(CUBE, position), goals=[goal])
+    assert int(solved[pixel][2]) < alone[pixel][2] - 30  # the cube takes the ground's blue
+
+
+def test_a_force_points_from_its_origin_along_its_vector():
+    arrow = Arrow((0.0, 0.0, 0.05), (0.1, 0.0, 0.0), RED)
+    frame = draw(forces=[arrow])
+    assert shows(frame, pixel_of((0.09, 0.0, 0.05)), RED)
+    assert not shows(frame, pixel_of((-0.02, 0.0, 0.05)), RED)
+    np.testing.assert_array_equal(draw(forces=[Arrow((0, 0, 0), (0, 0, 0))]), draw())
+
+
+def test_a_caption_changes_the_top_left_corner_only():
+    changed = np.argwhere((draw(caption="step 7") != draw()).any(axis=-1))
+    assert len(changed) > 0
+    assert changed[:, 0].max() < SIZE // 6
+
+
+@pytest.mark.parametrize("distance", [1.1, 3.0, 300.0])
+def test_what_lies_behind_the_camera_is_not_drawn(distance):
+    place = distance * Camera().eye * (1.0, 1.0, 1.0 / distance)
+    shapes = (Sphere(0.02), CUBE, Capsule(0.02, 0.02))
+    extras = {"goals": [Goal(place, 0.05)], "forces": [Arrow(place, (0.0, 0.1, 0.0))]}
+    np.testing.assert_array_equal(draw(*[item(s, place) for s in shapes], **extras), draw())
+
+
+def test_frames_tile_row_by_row():
+    frames = [np.full((2, 3, 3), k, np.uint8) for k in range(5)]
+    tiled = grid(frames)
+    assert tiled.shape == (4, 9, 3)
+    assert tiled[0, 0, 0] == 0
+    assert tiled[1, 8, 0] == 2
+    assert tiled[2, 3, 0] == 4
+    assert tiled[3, 8, 0] == 255
+    assert grid(frames, columns=1).shape == (10, 3, 3)
+
+
+@pytest.mark.parametrize(
+    "frames", [[], [np.zeros((2, 2, 3)), np.zeros((3, 2, 3))], [np.zeros((2, 2))]]
+)
+def test_frames_that_cannot_be_tiled_are_named(frames):
+    with pytest.raises(ValueError, match="one shape"):
+        grid(frames)
+
+
+def test_a_grid_needs_a_column():
+    with pytest.raises(ValueError, match="columns must be at least 1, got 0"):
+        grid([np.zeros((2, 2, 3), np.uint8)], columns=0)
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))])
+def test_a_copied_renderer_draws_the_same(clone):
+    renderer = Renderer("rgb_array", 64, 48, Camera(azimuth=10.0))
+    cube = [item(CUBE, (0.0, 0.0, 0.02))]
+    np.testing.assert_array_equal(clone(renderer).frame(cube), renderer.frame(cube))
+
+
+def test_off_screen_frames_need_no_display_and_leave_the_environment_alone():
+    program = """
+import os
+before = dict(os.environ)
+from rigid_envs.rendering import Goal, Renderer
+renderer = Renderer("rgb_array", 32, 24)
+assert renderer.frame([], goals=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
+import pygame
+assert not pygame.display.get_init()
+renderer.close()
+sdl = lambda env: {k: v for k, v in env.items() if "SDL" in k or k == "DISPLAY"}
+assert sdl(os.environ) == sdl(before) == {}
+"""
+    environment = {k: v for k, v in os.environ.items() if "SDL" not in k and k != "DISPLAY"}
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment, timeout=120)
+
+
+def test_a_window_shows_frames_until_its_user_closes_it(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    renderer = Renderer("human", 64, 48, fps=1000, title="Push")
+    assert renderer.frame([]) is None
+    assert pygame.display.get_caption()[0] == "Push"
+    assert not renderer.closed
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert renderer.frame([]) is None
+    assert renderer.closed
+    assert not pygame.display.get_init()
+    assert renderer.frame([]) is None
+    assert not pygame.display.get_init()
+    renderer.close()
+
+
+def test_a_missing_pygame_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(DependencyNotInstalled, match=r'pip install "rigid-envs\[render\]"'):
+        Renderer("rgb_array")
+
+
+def test_an_unknown_mode_is_named_with_the_valid_ones():
+    with pytest.raises(ValueError, match=r"mode.*human.*rgb_array.*'rgb_arry'"):
+        Renderer("rgb_arry")
+
+
+@pytest.mark.parametrize("field", ["width", "height", "fps"])
+def test_a_size_or_rate_must_be_positive(field):
+    with pytest.raises(ValueError, match=f"{field}.*got 0"):
+        Renderer("rgb_array", **{field: 0})
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("distance", 0.0), ("elevation", -10.0), ("field_of_view", 180.0), ("azimuth", np.nan)],
+)
+def test_a_camera_names_what_it_cannot_use(field, value):
+    with pytest.raises(ValueError, match=f"Camera.{field}"):
+        Camera(**{field: value})
+
+
+def test_a_shape_that_cannot_be_drawn_is_named():
+    @dataclass
+    class Torus:
+        radius: float
+
+    with pytest.raises(TypeError, match="Sphere, Box or Capsule to be drawn, got Torus"):
+        item(Torus(0.1), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("position", "orientation", "field"),
+    [((0, 0, np.nan), UPRIGHT, "position"), ((0, 0, 0), (0, 0, 0, 0), "orientation")],
+)
+def test_a_pose_that_is_none_is_named(position, orientation, field):
+    with pytest.raises(ValueError, match=f"Item.{field}"):
+        item(CUBE, position, orientation=orientation)
+
+
+def test_a_goal_or_force_that_is_not_finite_is_named():
+    with pytest.raises(ValueError, match=r"Goal\.position"):
+        Goal((np.inf, 0.0, 0.0), 0.05)
+    with pytest.raises(ValueError, match=r"Goal\.radius"):
+        Goal((0.0, 0.0, 0.0), 0.0)
+    with pytest.raises(ValueError, match=r"Arrow\.vector"):
+        Arrow((0.0, 0.0, 0.0), (0.0, 0.0, np.nan))

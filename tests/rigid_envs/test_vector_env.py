@@ -1,0 +1,500 @@
+"""Many worlds behave as many single environments, in Gymnasium's three ways to start anew."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from physics import SimulationDiverged
+from rigid_envs import RigidEnv, RigidVectorEnv
+from tests.rigid_envs.rollout import (
+    EPISODE,
+    IDS,
+    PRESETS,
+    PUSH,
+    REWARDS,
+    assert_same,
+    make_vec,
+    one_world,
+    push_blindly,
+    put_cubes_on_goals,
+    random_actions,
+    steps_of,
+)
+
+SEED = 1000
+# of every seed that is used below, so that a world's actions don't depend on its place in a batch
+NOISE = np.random.default_rng(0).uniform(-1.0, 1.0, (EPISODE, 300, 3)).astype(np.float32)
+NEXT_STEP, SAME_STEP, DISABLED = (
+    AutoresetMode.NEXT_STEP,
+    AutoresetMode.SAME_STEP,
+    AutoresetMode.DISABLED,
+)
+
+
+# --- contract -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_make_vec_gives_the_native_environment(env_id):
+    envs = make_vec(5, env_id)
+    assert type(envs) is RigidVectorEnv
+    assert envs.spec.id == env_id
+    assert envs.num_envs == 5
+    assert envs.metadata["autoreset_mode"] is NEXT_STEP
+    observation, _ = envs.reset(seed=0)
+    assert envs.observation_space.contains(observation)
+    assert envs.single_observation_space == gym.make(env_id).observation_space
+    assert envs.single_action_space == gym.make(env_id).action_space
+
+
+def test_a_module_prefix_in_the_id_imports_the_package():
+    assert type(gym.make_vec(f"rigid_envs:{PUSH}", num_envs=2)) is RigidVectorEnv
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_the_metadata_names_the_autoreset_mode_of_this_environment_alone(mode):
+    for name in (mode, mode.name, mode.value):
+        assert make_vec(1, autoreset_mode=name).metadata["autoreset_mode"] is mode
+    assert make_vec(1).metadata["autoreset_mode"] is NEXT_STEP
+
+
+@pytest.mark.parametrize("reward_type", REWARDS)
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_observations_lie_in_the_space(fidelity, reward_type):
+    envs = make_vec(128, fidelity=fidelity, reward_type=reward_type)
+    observation, _ = envs.reset(seed=0)
+    assert envs.observation_space.contains(observation)
+    for result in steps_of(envs, random_actions(110, 128)):
+        assert envs.observation_space.contains(result[0])
+        assert [part.dtype for part in result[1:4]] == [np.float64, bool, bool]
+        assert [part.shape for part in result[1:4]] == [(128,)] * 3
+
+
+@pytest.mark.parametrize("steps", [7, 50, None])
+def test_the_length_of_an_episode_can_be_set(steps):
+    envs = make_vec(2, max_episode_steps=steps)
+    envs.reset(seed=0)
+    truncated = [bool(result[3].all()) for result in steps_of(envs, random_actions(60, 2))]
+    assert truncated.index(True) + 1 == steps if steps else not any(truncated)
+
+
+def test_every_info_has_a_mask():
+    envs = make_vec(3)
+    for info in (envs.reset(seed=0)[1], envs.step(np.zeros((3, 3)))[4]):
+        names = {name for name in info if not name.startswith("_")}
+        assert names == {"is_success", "success", "out_of_bounds", "reach"}
+        for name in names:
+            assert info[name].shape == (3,)
+            np.testing.assert_array_equal(info[f"_{name}"], [True] * 3)
+
+
+def test_what_was_returned_is_never_written_to_again():
+    envs = make_vec(3, autoreset_mode=SAME_STEP, max_episode_steps=5)
+    envs.reset(seed=0)
+    results = list(steps_of(envs, random_actions(5, 3)))
+    kept = copy.deepcopy(results[3:])
+    list(steps_of(envs, random_actions(12, 3)))
+    assert_same(results[3:], kept)
+
+
+# --- one world of many is a single environment --------------------------------------------------
+
+
+def two_episodes_alone(seed, **kwargs):
+    """Everything that the single environment says in the first two episodes of a seed."""
+    env = RigidEnv(max_episode_steps=EPISODE, **kwargs)
+    told = []
+    for start in ({"seed": seed}, {}):
+        observation, info = env.reset(**start)
+        told.append((observation, info))
+        for noise in NOISE[:, seed - SEED]:
+            told.append(env.step(push_blindly(observation, noise)))
+            observation = told[-1][0]
+    return told
+
+
+def two_episodes_together(seeds, **kwargs):
+    """What a vector environment says in them, a list of all steps."""
+    envs = make_vec(len(seeds), **kwargs)
+    told = [envs.reset(seed=seeds)]
+    for _ in range(2):
+        for noise in NOISE[:, np.array(seeds) - SEED]:
+            told.append(envs.step(push_blindly(told[-1][0], noise)))
+        told.append(envs.step(NOISE[0, : len(seeds)]))
+    return told[:-1]
+
+
+@pytest.fixture(scope="module")
+def together():
+    return two_episodes_together(list(range(SEED, SEED + 300)), threads=1)
+
+
+@pytest.mark.parametrize("world", [0, 1, 63, 64, 127, 299])
+def test_a_world_of_many_is_the_single_environment_to_the_last_bit(together, world):
+    alone = two_episodes_alone(SEED + world)
+    assert len(alone) == len(together) == 2 * EPISODE + 2
+    for step, (one, many) in enumerate(zip(alone, together, strict=True)):
+        if step == EPISODE + 1:  # the second reset of one is a step of the others
+            observation, reward, terminated, truncated, info = one_world(many, world)
+            assert (reward, terminated, truncated) == (0.0, False, False)
+            assert_same((observation, info), one)
+        else:
+            assert_same(one_world(many, world), one)
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "accurate"])
+@pytest.mark.parametrize("reward_type", REWARDS)
+def test_so_it_is_at_every_preset_and_reward(fidelity, reward_type):
+    kwargs = {"fidelity": fidelity, "reward_type": reward_type}
+    together = two_episodes_together(list(range(SEED, SEED + 5)), **kwargs)
+    alone = two_episodes_alone(SEED + 3, **kwargs)
+    for one, many in zip(alone[: EPISODE + 1], together[: EPISODE + 1], strict=True):
+        assert_same(one_world(many, 3), one)
+
+
+def test_the_cube_is_pushed_in_those_episodes(together):
+    start, end = (together[step][0]["achieved_goal"] for step in (0, EPISODE))
+    assert (np.abs(start - end).max(axis=1) > 0.01).mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("first", "count", "threads"),
+    [(0, 1, 1), (0, 2, 2), (60, 7, 1), (10, 65, 2), (100, 129, 2), (0, 300, 2), (0, 300, 5)],
+)
+def test_batch_size_place_and_threads_change_no_bit(together, first, count, threads):
+    part = two_episodes_together(list(range(SEED + first, SEED + first + count)), threads=threads)
+    for few, many in zip(part, together, strict=True):
+        for world in range(count):
+            assert_same(one_world(few, world), one_world(many, first + world))
+
+
+def test_neighbours_change_no_bit(together):
+    seeds = [SEED + 200, SEED + 5, SEED + 150, SEED + 150]
+    for few, many in zip(two_episodes_together(seeds), together, strict=True):
+        for place, seed in enumerate(seeds):
+            assert_same(one_world(few, place), one_world(many, seed - SEED))
+
+
+def test_a_seed_for_all_counts_up_by_world(together):
+    assert_same(make_vec(300).reset(seed=SEED), together[0])
+
+
+def test_a_seed_starts_over_whatever_came_before(together):
+    envs = make_vec(20)
+    envs.reset(seed=77)
+    list(steps_of(envs, random_actions(70, 20)))
+    told = [envs.reset(seed=SEED)]
+    for noise in NOISE[:, :20]:
+        told.append(envs.step(push_blindly(told[-1][0], noise)))
+    for few, many in zip(told, together[: EPISODE + 1], strict=True):
+        for world in range(20):
+            assert_same(one_world(few, world), one_world(many, world))
+
+
+# --- starting anew ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("reward_type", REWARDS)
+def test_the_native_environment_says_what_gymnasiums_says(mode, reward_type):
+    """Episodes end at different times: some by success, others by time."""
+    kwargs = {"reward_type": reward_type, "terminate_on_success": True}
+    native = make_vec(4, autoreset_mode=mode, **kwargs)
+    vector_kwargs = {"autoreset_mode": mode}
+    sync = make_vec(4, vectorization_mode="sync", vector_kwargs=vector_kwargs, **kwargs)
+    assert_same(native.reset(seed=8), sync.reset(seed=8))
+    for step, actions in enumerate(random_actions(120, 4)):
+        if step in (20, 61, 75):
+            put_cubes_on_goals(native, np.array([False, True, False, step == 61]))
+            put_cubes_on_goals(sync.envs[1].unwrapped)
+            if step == 61:
+                put_cubes_on_goals(sync.envs[3].unwrapped)
+        ours, theirs = native.step(actions), sync.step(actions)
+        ended = ours[2] | ours[3]
+        # Gymnasium leaves zeros in final_info where nothing ended, which its mask says
+        np.testing.assert_equal(_masked(ours), _masked(theirs))
+        if mode is DISABLED and ended.any():
+            options = {"reset_mask": ended}
+            one, other = (x.reset(options=dict(options))[0] for x in (native, sync))
+            for key in one:
+                np.testing.assert_array_equal(one[key][ended], other[key][ended])
+
+
+def _masked(result):
+    *head, info = result
+    return *head, _masked_info(info)
+
+
+def _masked_info(info):
+    told = {}
+    for name, value in info.items():
+        mask = info.get(f"_{name}")
+        if name.startswith("_"):
+            told[name] = value
+        elif isinstance(value, dict):
+            told[name] = _masked_info(value)
+        else:
+            told[name] = value[mask].tolist()
+    return told
+
+
+def test_next_step_resets_in_the_step_after_the_end_and_ignores_its_action():
+    envs = make_vec(2, max_episode_steps=3, reward_type="dense")
+    other = copy.deepcopy(envs)
+    for both in (envs, other):
+        both.reset(seed=0)
+        for result in steps_of(both, random_actions(3, 2)):
+            last = result
+        assert last[3].all()
+    observation, reward, terminated, truncated, _ = envs.step(np.ones((2, 3)))
+    assert_same(observation, other.step(-np.ones((2, 3)))[0])
+    assert not np.array_equal(observation["desired_goal"], last[0]["desired_goal"])
+    assert reward.tolist() == [0.0, 0.0]
+    assert not (terminated | truncated).any()
+
+
+def test_same_step_gives_the_last_observation_and_info_apart():
+    envs = make_vec(3, autoreset_mode=SAME_STEP, terminate_on_success=True)
+    goals = envs.reset(seed=0)[0]["desired_goal"]
+    solved = np.array([False, True, False])
+    put_cubes_on_goals(envs, solved)
+    observation, reward, terminated, truncated, info = envs.step(np.zeros((3, 3)))
+    np.testing.assert_array_equal(terminated, solved)
+    assert not truncated.any()
+    assert reward.tolist() == [-1.0, 0.0, -1.0]
+    np.testing.assert_array_equal(info["_final_obs"], solved)
+    np.testing.assert_array_equal(info["_final_info"], solved)
+    np.testing.assert_array_equal(info["final_info"]["_is_success"], solved)
+    assert info["final_info"]["is_success"][1]
+    assert not info["is_success"][1]  # the new episode's
+    assert [last is None for last in info["final_obs"]] == [True, False, True]
+    assert envs.single_observation_space.contains(info["final_obs"][1])
+    np.testing.assert_array_equal(info["final_obs"][1]["desired_goal"], goals[1])
+    assert not np.array_equal(observation["desired_goal"][1], goals[1])
+    np.testing.assert_array_equal(observation["desired_goal"][[0, 2]], goals[[0, 2]])
+
+
+def test_same_step_says_nothing_of_last_things_while_no_episode_ends():
+    envs = make_vec(3, autoreset_mode=SAME_STEP)
+    envs.reset(seed=0)
+    assert not [name for name in envs.step(np.zeros((3, 3)))[4] if "final" in name]
+
+
+def test_disabled_refuses_to_step_worlds_that_have_ended():
+    envs = make_vec(3, autoreset_mode=DISABLED, terminate_on_success=True)
+    envs.reset(seed=0)
+    put_cubes_on_goals(envs, np.array([False, True, False]))
+    ended = envs.step(np.zeros((3, 3)))[2]
+    before = envs.get_state()
+    with pytest.raises(gym.error.ResetNeeded, match=r"worlds \[1\] have ended: call reset"):
+        envs.step(np.zeros((3, 3)))
+    assert_untouched(envs, before)
+    envs.reset(options={"reset_mask": ended})
+    envs.step(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("seed", [None, 42])
+def test_a_partial_reset_leaves_the_other_worlds_alone(seed):
+    envs, undisturbed = make_vec(5, autoreset_mode=DISABLED), make_vec(5, autoreset_mode=DISABLED)
+    for both in (envs, undisturbed):
+        both.reset(seed=SEED)
+        list(steps_of(both, random_actions(20, 5)))
+    mask = np.array([True, False, False, True, False])
+    observation, info = envs.reset(seed=seed, options={"reset_mask": mask})
+    alone = RigidEnv()
+    alone.reset(seed=SEED + 3 if seed is None else seed + 3)
+    expected = alone.reset() if seed is None else alone.reset(seed=seed + 3)
+    assert_same(one_world((observation, info), 3), expected)
+    for actions in random_actions(30, 5, seed=1):
+        one, other = envs.step(actions), undisturbed.step(actions)
+        for world in np.flatnonzero(~mask):
+            assert_same(one_world(one, world), one_world(other, world))
+        assert_same(one_world(one, 3)[0], alone.step(actions[3])[0])
+    assert one[3].tolist() == (~mask).tolist()
+
+
+# --- state --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", [NEXT_STEP, SAME_STEP])
+def test_saving_and_going_back_repeats_to_the_last_bit(mode):
+    envs = make_vec(70, autoreset_mode=mode)
+    envs.reset(seed=0)
+    actions = random_actions(120, 70)
+    list(steps_of(envs, actions[:50]))  # in NEXT_STEP mode the next step is a reset
+    saved = pickle.loads(pickle.dumps(envs.get_state()))
+    expected = list(steps_of(envs, actions[50:]))
+    envs.set_state(saved)
+    assert_same(list(steps_of(envs, actions[50:])), expected)
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_a_copy_goes_on_by_itself_to_the_last_bit(clone):
+    envs = make_vec(130, threads=2)
+    envs.reset(seed=0)
+    actions = random_actions(60, 130)
+    list(steps_of(envs, actions[:20]))
+    twin = clone(envs)
+    expected = list(steps_of(envs, actions[20:]))
+    assert_same(list(steps_of(twin, actions[20:])), expected)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def envs():
+    envs = make_vec(4)
+    envs.reset(seed=0)
+    list(steps_of(envs, random_actions(10, 4)))
+    return envs
+
+
+def assert_untouched(envs, before):
+    after = envs.get_state()
+    for name, one, other in zip(
+        before["world"].state._fields, before["world"].state, after["world"].state, strict=True
+    ):
+        assert one.tobytes() == other.tobytes(), name
+    for name in before.keys() - {"world"}:
+        np.testing.assert_array_equal(before[name], after[name])
+
+
+def bad_actions(world, component, value=np.nan):
+    actions = np.zeros((4, 3))
+    actions[world, component] = value
+    return actions
+
+
+@pytest.mark.parametrize(
+    ("actions", "match"),
+    [
+        (bad_actions(2, 1), r"NaN in world 2, component 1 \(finger y\)"),
+        (bad_actions(0, 0), r"NaN in world 0, component 0 \(finger x\)"),
+        (np.zeros((3, 3)), r"shape \(4, 3\), got \(3, 3\)"),
+        (np.zeros(3), r"shape \(4, 3\), got \(3,\)"),
+        (None, r"shape \(4, 3\), got \(\)"),
+        ([[0.0] * 3] * 3 + [[0.0] * 2], "action must be numbers of shape"),
+        ("push", "action must be numbers of shape"),
+    ],
+)
+def test_bad_actions_are_named_and_move_no_world(envs, actions, match):
+    before = envs.get_state()
+    with pytest.raises(ValueError, match=match):
+        envs.step(actions)
+    assert_untouched(envs, before)
+
+
+@pytest.mark.parametrize("size", [1.5, 1e30, np.inf])
+def test_actions_out_of_range_are_clipped(envs, size):
+    twin = copy.deepcopy(envs)
+    signs = np.sign(random_actions(1, 4)[0])
+    assert_same(envs.step(size * signs), twin.step(signs))
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "match"),
+    [
+        ({"num_envs": 0}, ValueError, "num_envs must be at least 1, got 0"),
+        ({"num_envs": -3}, ValueError, "num_envs must be at least 1, got -3"),
+        ({"num_envs": 1.5}, TypeError, "num_envs must be an integer, got 1.5"),
+        ({"num_envs": True}, TypeError, "num_envs must be an integer, got True"),
+        ({"threads": 0}, ValueError, "threads must be at least 1, got 0"),
+        ({"autoreset_mode": "sometimes"}, ValueError, "autoreset_mode must be one of .*NEXT_STEP"),
+        ({"autoreset_mode": None}, ValueError, "autoreset_mode must be one of .*got None"),
+        ({"reward_type": "sprase"}, ValueError, "reward_type.*did you mean 'sparse'"),
+        ({"fidelity": "acurate"}, ValueError, "fidelity.*did you mean 'accurate'"),
+        ({"render_mode": "ansi"}, ValueError, "render_mode must be one of .*got 'ansi'"),
+        ({"max_episode_steps": 0}, ValueError, "max_episode_steps must be at least 1, got 0"),
+        ({"terminate_on_success": "no"}, TypeError, "terminate_on_success must be a bool"),
+        ({"task": "puhs"}, ValueError, "task.*did you mean 'push'"),
+    ],
+)
+def test_a_bad_argument_is_named_with_what_would_be_right(kwargs, error, match):
+    with pytest.raises(error, match=match):
+        RigidVectorEnv(**{"num_envs": 2, **kwargs})
+
+
+@pytest.mark.parametrize(
+    ("seed", "match"),
+    [
+        (-1, "seed must be at least 0, got -1"),
+        (1.5, "seed must be an int or 4 of them, got 1.5"),
+        ("abcd", "seed must be an int or 4 of them, got 'abcd'"),
+        (True, "seed must be an integer, got True"),
+        (2**63, r"seed must be at most 2\*\*62, got 9223372036854775808"),
+        ([1, 2, 3], r"seed must be an int or 4 of them, got \[1, 2, 3\]"),
+        ([1, 2, -3, 4], r"seed\[2\] must be at least 0, got -3"),
+        ([1, 2, 3, "4"], r"seed\[3\] must be an integer, got '4'"),
+    ],
+)
+def test_a_bad_seed_is_named_and_resets_no_world(envs, seed, match):
+    before = envs.get_state()
+    with pytest.raises((TypeError, ValueError), match=match):
+        envs.reset(seed=seed)
+    assert_untouched(envs, before)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"mask": 1}, r"options knows only \"reset_mask\", got \['mask'\]"),
+        ({"reset_mask": [1, 0, 0, 0]}, r"bools of shape \(4,\).*got int64"),
+        (
+            {"reset_mask": np.ones(3, dtype=bool)},
+            r"bools of shape \(4,\).*got bool of shape \(3,\)",
+        ),
+        ({"reset_mask": np.zeros(4, dtype=bool)}, "one true at least"),
+    ],
+)
+def test_bad_options_are_named_and_reset_no_world(envs, options, match):
+    before = envs.get_state()
+    with pytest.raises(ValueError, match=match):
+        envs.reset(options=options)
+    assert_untouched(envs, before)
+
+
+def test_stepping_before_the_first_reset_is_refused():
+    with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) must be called before step"):
+        make_vec(2).step(np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("state", [None, 3, {}, {"ended": 1}])
+def test_what_is_no_state_is_refused(envs, state):
+    before = envs.get_state()
+    with pytest.raises(ValueError, match="state must "):
+        envs.set_state(state)
+    assert_untouched(envs, before)
+
+
+def test_a_state_of_another_count_is_refused(envs):
+    other = make_vec(5)
+    other.reset(seed=0)
+    before = envs.get_state()
+    with pytest.raises(ValueError, match="another scene, fidelity or count"):
+        envs.set_state(other.get_state())
+    assert_untouched(envs, before)
+
+
+def test_a_world_that_diverges_is_named_and_the_others_lose_nothing(envs):
+    undisturbed = copy.deepcopy(envs)
+    broken = np.array([False, False, True, False])
+    far = np.full((1, 1, 3), 1.795e308)
+    envs._runner.world.set_state(position=far, linear_velocity=far, worlds=broken)
+    actions = random_actions(40, 4, seed=1)
+    for action in actions[:2]:  # until it is reset, it says so in each step
+        with pytest.raises(SimulationDiverged, match="world 2: body 0 turned non-finite") as error:
+            envs.step(action)
+        assert error.value.worlds == [2]
+        undisturbed.step(action)
+    observation, _ = envs.reset(options={"reset_mask": broken})
+    assert all(np.isfinite(values).all() for values in observation.values())
+    for action in actions[2:]:
+        ours, theirs = envs.step(action), undisturbed.step(action)
+        for world in (0, 1, 3):
+            assert_same(one_world(ours, world), one_world(theirs, world))
+    assert ours[3].tolist() == [True, True, False, True]

@@ -1,0 +1,96 @@
+"""The command line: starts without the training extra, helps, and never shows a traceback."""
+
+import subprocess
+import sys
+
+import pytest
+
+from training import cli
+
+COMMANDS = ("train", "evaluate", "record", "scripted", "plot", "demo")
+
+
+def test_starts_without_stable_baselines3_and_torch():
+    code = (
+        "import sys, training.cli\n"
+        "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'imageio', 'yaml', 'rich'}\n"
+        "sys.exit(repr(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+
+
+def test_help_lists_every_command(capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["--help"])
+    assert caught.value.code == 0
+    shown = capsys.readouterr().out
+    assert all(command in shown for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main([command, "--help"])
+    assert caught.value.code == 0
+    assert "--env" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ([], "COMMAND"),
+        (["trian"], "invalid choice: 'trian'"),
+        (["train", "--algo", "pp0"], "did you mean 'ppo'?"),
+        (["train", "--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
+        (["train", "-n", "0"], "should be an integer of at least 1"),
+        (["train", "-n", "many"], "should be an integer of at least"),
+        (["train", "--seed", "-1"], "seed"),
+        (["train", "--config", "nowhere.yaml"], "nowhere.yaml: No such file"),
+        (["train", "--hyperparams", "gama:0.9"], "did you mean 'gamma'?"),
+        (["train", "--hyperparams", "gamma"], "should be KEY:VALUE"),
+        (["train", "--hyperparams", "gamma:2"], "gamma is 2, should be a number above 0"),
+        (["train", "--frobnicate"], "unrecognized arguments: --frobnicate"),
+        (["evaluate", "nowhere"], "nowhere does not exist"),
+        (["evaluate", "-f", "nowhere"], "no run of ppo on RigidEnvs/Push-v0 under nowhere"),
+        (["record", "-f", "nowhere", "--algo", "sac"], "no run of sac"),
+        (["plot", "nowhere"], "progress.csv is missing"),
+        (["scripted", "--env", "Nothing-v0"], "no scripted controller"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(words, complaint, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(words) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("error: ")
+    assert shown.err.count("\n") == 1
+    assert complaint in shown.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_packages_name_the_extra(capsys, monkeypatch):
+    monkeypatch.setattr(cli, "TRAIN_EXTRA", ("no_such_package",))
+    assert cli.main(["scripted"]) == 2
+    assert (
+        capsys.readouterr().err
+        == 'error: this command needs no_such_package: pip install "rigid-envs[train]"\n'
+    )
+
+
+def test_defects_of_ours_keep_their_traceback(monkeypatch):
+    def defect(*_):
+        raise ValueError("ours")
+
+    monkeypatch.setattr(cli, "_scripted", defect)
+    with pytest.raises(ValueError, match="ours"):
+        cli.main(["scripted"])
+
+
+def test_ctrl_c_leaves_with_the_shell_s_status(monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_scripted", interrupted)
+    assert cli.main(["scripted"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"

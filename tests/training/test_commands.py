@@ -1,0 +1,77 @@
+"""The commands end to end, on the test double."""
+
+import pytest
+
+from tests.training.reach import straight_to_the_goal
+from training import cli
+from training.policy import CONTROLLERS
+
+
+@pytest.fixture
+def trained(reach, tmp_path, quick_ppo, write_yaml):
+    """Arguments that find the one run under tmp_path."""
+    config = write_yaml(quick_ppo.as_yaml())
+    where = ["--env", reach, "-f", str(tmp_path)]
+    assert cli.main(["train", *where, "--config", str(config)]) == 0
+    return where
+
+
+def test_train_says_where_the_run_is(capsys, trained):
+    out = capsys.readouterr().out
+    assert "trained after 160 steps" in out
+    assert "Test-Reach-v0_1" in out
+    assert "in the environments" in out
+
+
+def test_evaluate_finds_the_latest_run(trained, capsys):
+    assert cli.main(["evaluate", *trained, "-n", "20"]) == 0
+    assert "20 episodes" in capsys.readouterr().out
+
+
+def test_evaluate_takes_a_folder_a_model_and_other_arguments(trained, tmp_path, capsys):
+    folder = tmp_path / "ppo" / "Test-Reach-v0_1"
+    assert cli.main(["evaluate", str(folder), "-n", "5", "--stochastic"]) == 0
+    assert cli.main(["evaluate", str(folder / "model.zip"), "-n", "5", "--seed", "4"]) == 0
+    assert cli.main(["evaluate", str(folder), "-n", "5", "--env-kwargs", "reward_type:sparse"]) == 0
+    assert "-10.000" in capsys.readouterr().out
+
+
+def test_record_and_plot_write_into_the_run_folder(trained, tmp_path, capsys):
+    folder = tmp_path / "ppo" / "Test-Reach-v0_1"
+    assert cli.main(["record", *trained, "-n", "1"]) == 0
+    assert cli.main(["plot", *trained]) == 0
+    out = capsys.readouterr().out
+    for name in ("video.mp4", "video.png", "learning_curve.png"):
+        assert (folder / name).stat().st_size > 0
+        assert str(folder / name) in out
+
+
+def test_scripted_prints_its_table(reach, monkeypatch, capsys):
+    monkeypatch.setitem(CONTROLLERS, reach, straight_to_the_goal)
+    assert cli.main(["scripted", "--env", reach, "-n", "10"]) == 0
+    assert "100.0%" in capsys.readouterr().out
+
+
+def test_command_line_goes_over_the_file(reach, tmp_path, quick_ppo, write_yaml, capsys):
+    config = write_yaml(quick_ppo.as_yaml())
+    words = ["train", "--env", reach, "-f", str(tmp_path), "--config", str(config), "--seed", "8"]
+    words += ["-n", "80", "--hyperparams", "gamma:0.9", "--env-kwargs", "max_episode_steps:5"]
+    assert cli.main([*words, "--fidelity", "fast"]) == 0
+    from training.run_folder import latest_run
+
+    config = latest_run(tmp_path, "ppo", reach).config()
+    assert (config.seed, config.n_timesteps, config.gamma) == (8, 80, 0.9)
+    assert config.env_kwargs == {
+        "reward_type": "dense",
+        "max_episode_steps": 5,
+        "fidelity": "fast",
+    }
+
+
+def test_demo_goes_the_whole_way(reach, tmp_path, quick_ppo, write_yaml, capsys):
+    config = write_yaml(quick_ppo.as_yaml())
+    words = ["demo", "--env", reach, "-f", str(tmp_path), "--config", str(config)]
+    assert cli.main([*words, "--n-episodes", "10"]) == 0
+    out = capsys.readouterr().out
+    for part in ("success rate", "wall time", "video.mp4", "learning_curve.png"):
+        assert part in out

@@ -1,0 +1,127 @@
+"""The adapter, training and evaluation on the real environment."""
+
+import numpy as np
+import pytest
+from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.her import HerReplayBuffer
+
+from training.config import load_config
+from training.environments import make_vector_env
+from training.evaluate import evaluate
+from training.plot import plot_learning_curve
+from training.policy import scripted_policy, trained_policy
+from training.record import record
+from training.train import train
+from training.vec_env import RigidVecEnv
+
+PUSH = "RigidEnvs/Push-v0"
+WORLDS = 4
+EPISODE = 50
+
+
+@pytest.fixture
+def push():
+    env = RigidVecEnv(make_vector_env(PUSH, WORLDS, reward_type="sparse"))
+    yield env
+    env.close()
+
+
+def random_actions(env, random) -> np.ndarray:
+    return random.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
+
+
+def test_observations_and_rewards_fit_their_spaces(push):
+    push.seed(0)
+    observation = push.reset()
+    random = np.random.default_rng(0)
+    for _ in range(5):
+        for world in range(WORLDS):
+            one = {key: value[world] for key, value in observation.items()}
+            assert push.observation_space.contains(one)
+        observation, rewards, dones, infos = push.step(random_actions(push, random))
+        assert rewards.dtype == np.float32
+        assert dones.dtype == bool
+        assert len(infos) == WORLDS
+
+
+def test_episodes_are_cut_short_by_time_with_a_terminal_observation_of_their_own(push):
+    push.seed(0)
+    first = push.reset()
+    goals = first["desired_goal"].copy()
+    random = np.random.default_rng(0)
+    for step in range(1, EPISODE + 1):
+        observation, rewards, dones, infos = push.step(random_actions(push, random))
+        assert dones.tolist() == [step == EPISODE] * WORLDS
+    for world, info in enumerate(infos):
+        terminal = info["terminal_observation"]
+        assert info["TimeLimit.truncated"] is True
+        assert isinstance(info["is_success"], bool)
+        np.testing.assert_array_equal(terminal["desired_goal"], goals[world])
+        assert not np.array_equal(observation["desired_goal"][world], goals[world])
+        relabelled = push.env_method(
+            "compute_reward",
+            terminal["achieved_goal"][None],
+            terminal["desired_goal"][None],
+            [{}],
+            indices=[world],
+        )
+        assert relabelled[0] == rewards[world]
+
+
+def test_terminal_observations_outlive_later_steps(push):
+    push.seed(0)
+    push.reset()
+    random = np.random.default_rng(0)
+    for _ in range(EPISODE):
+        _, _, _, infos = push.step(random_actions(push, random))
+    kept = [{k: v.copy() for k, v in info["terminal_observation"].items()} for info in infos]
+    for _ in range(EPISODE):
+        push.step(random_actions(push, random))
+    for info, expected in zip(infos, kept, strict=True):
+        for key, value in info["terminal_observation"].items():
+            np.testing.assert_array_equal(value, expected[key])
+
+
+def test_hindsight_replay_relabels_pushes(push):
+    model = SAC(
+        "MultiInputPolicy",
+        VecMonitor(push),
+        replay_buffer_class=HerReplayBuffer,
+        replay_buffer_kwargs={"n_sampled_goal": 4},
+        learning_starts=EPISODE * WORLDS,
+        buffer_size=2000,
+        batch_size=32,
+        policy_kwargs={"net_arch": [16]},
+        seed=0,
+    )
+    model.learn(EPISODE * WORLDS + 20)
+    rewards = model.replay_buffer.sample(64).rewards.numpy()
+    assert set(np.unique(rewards)) <= {-1.0, 0.0}
+    assert 0.0 in rewards  # a goal taken from the future of a resting cube is reached
+
+
+def test_a_short_run_trains_evaluates_films_and_draws(tmp_path):
+    config = load_config("ppo", PUSH).replace(
+        n_envs=16, n_timesteps=16 * 100, n_steps=50, batch_size=400, target_success_rate=None
+    )
+    folder = train(config, tmp_path, quiet=True).folder
+    policy = trained_policy(folder.path)
+    result = evaluate(policy, 20, quiet=True)
+    assert len(result.success_at_end) == 20
+    assert (result.length == EPISODE).all()
+    video, still = record(policy, folder.path / "video.mp4", episodes=1, quiet=True)
+    assert video.stat().st_size > 0
+    assert still.stat().st_size > 0
+    assert plot_learning_curve(folder).stat().st_size < 300_000
+
+
+def test_the_packaged_settings_build_on_the_environment(tmp_path):
+    config = load_config("sac", PUSH).replace(
+        n_timesteps=8 * EPISODE + 80, learning_starts=8 * EPISODE, buffer_size=2000
+    )
+    assert train(config, tmp_path, quiet=True).steps >= 8 * EPISODE
+
+
+def test_the_scripted_controller_solves_nearly_all():
+    assert evaluate(scripted_policy(PUSH), 100, quiet=True).success_at_end.mean() >= 0.97

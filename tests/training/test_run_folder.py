@@ -1,0 +1,91 @@
+import json
+
+import pytest
+
+from training import run_folder
+from training.config import load_config
+from training.errors import UsageError
+from training.run_folder import RunFolder, create_run_folder, latest_run, written_whole
+
+
+def test_each_run_gets_a_folder_of_its_own(tmp_path, quick_ppo):
+    paths = [create_run_folder(tmp_path, quick_ppo).path for _ in range(3)]
+    assert [path.name for path in paths] == [f"Test-Reach-v0_{n}" for n in (1, 2, 3)]
+    assert {path.parent for path in paths} == {tmp_path / "ppo"}
+
+
+def test_numbers_of_deleted_runs_in_between_are_not_used_again(tmp_path, quick_ppo):
+    first = create_run_folder(tmp_path, quick_ppo).path
+    create_run_folder(tmp_path, quick_ppo)
+    for file in first.iterdir():
+        file.unlink()
+    first.rmdir()
+    assert create_run_folder(tmp_path, quick_ppo).path.name == "Test-Reach-v0_3"
+
+
+def test_a_folder_that_appears_at_the_same_time_is_left_alone(tmp_path, quick_ppo, monkeypatch):
+    taken = create_run_folder(tmp_path, quick_ppo)
+    before = taken.path.joinpath("config.yaml").read_bytes()
+    monkeypatch.setattr(run_folder, "_runs", lambda *_: [])
+    other = create_run_folder(tmp_path, quick_ppo.replace(seed=9))
+    assert other.path.name == "Test-Reach-v0_2"
+    assert taken.path.joinpath("config.yaml").read_bytes() == before
+
+
+def test_the_folder_says_what_made_the_run(tmp_path, quick_ppo):
+    folder = create_run_folder(tmp_path, quick_ppo)
+    assert load_config("ppo", "Test/Reach-v0", folder.path / "config.yaml") == quick_ppo
+    assert folder.config() == quick_ppo
+    run = json.loads((folder.path / "run.json").read_text())
+    assert run["seed"] == 3
+    assert run["algo"] == "ppo"
+    assert run["command"]
+    assert run["git_commit"] is None or len(run["git_commit"]) == 40
+    versions = json.loads((folder.path / "versions.json").read_text())
+    for package in ("python", "numpy", "numba", "gymnasium", "stable-baselines3", "torch"):
+        assert versions[package]
+    assert "rigid-envs" in versions
+
+
+def test_latest_run_is_the_one_with_the_highest_number(tmp_path, quick_ppo):
+    for _ in range(10):
+        newest = create_run_folder(tmp_path, quick_ppo)
+    assert latest_run(tmp_path, "ppo", "Test/Reach-v0") == newest
+
+
+def test_no_run_yet_says_how_to_make_one(tmp_path):
+    with pytest.raises(UsageError, match="rigid-envs train --algo ppo --env Test/Reach-v0"):
+        latest_run(tmp_path, "ppo", "Test/Reach-v0")
+
+
+def test_log_folder_that_is_a_file_is_named(tmp_path, quick_ppo):
+    file = tmp_path / "runs"
+    file.write_text("")
+    with pytest.raises(UsageError, match="runs"):
+        create_run_folder(file, quick_ppo)
+    (tmp_path / "ppo").write_text("")
+    with pytest.raises(UsageError, match=r"cannot make a folder in .*ppo"):
+        create_run_folder(tmp_path, quick_ppo)
+
+
+def test_other_folders_are_no_runs(tmp_path):
+    with pytest.raises(UsageError, match=r"run\.json is missing"):
+        RunFolder(tmp_path).config()
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(UsageError, match=r"run\.json is damaged"):
+        RunFolder(tmp_path).config()
+
+
+def test_failed_write_leaves_the_file_before_whole(tmp_path):
+    path = tmp_path / "model.zip"
+    path.write_bytes(b"before")
+
+    def write_half() -> None:
+        with written_whole(path) as file:
+            file.write(b"half")
+            raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        write_half()
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]

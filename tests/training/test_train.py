@@ -1,0 +1,175 @@
+import csv
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from training import train as train_module
+from training.config import SACConfig
+from training.errors import UsageError
+from training.plot import plot_learning_curve, read_learning_curve
+from training.policy import trained_policy
+from training.progress import StopAtSuccess
+from training.train import LinearSchedule, train
+
+
+@pytest.fixture
+def quick_sac(reach):
+    return SACConfig(
+        env_id=reach,
+        n_envs=4,
+        n_timesteps=200,
+        batch_size=32,
+        buffer_size=1000,
+        learning_starts=80,
+        train_freq=2,
+        seed=3,
+        env_kwargs={"reward_type": "sparse"},
+        policy_kwargs={"net_arch": [8], "activation": "relu"},
+        replay_buffer_class="HerReplayBuffer",
+        replay_buffer_kwargs={"n_sampled_goal": 4, "goal_selection_strategy": "future"},
+    )
+
+
+def test_a_run_leaves_logs_and_a_policy(quick_ppo, tmp_path):
+    result = train(quick_ppo, tmp_path, quiet=True)
+    assert result.steps == 160
+    assert not result.interrupted
+    assert 0 < result.environment_share < 1
+    names = {path.name.split(".")[0] for path in result.folder.path.iterdir()}
+    assert names == {"config", "run", "versions", "progress", "model", "events"}
+    with result.folder.progress.open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["time/total_timesteps"]) for row in rows] == [80, 160]
+
+
+def test_the_same_seed_trains_the_same_policy(quick_ppo, tmp_path):
+    observation = {
+        key: np.full((2, 2), 0.3, np.float32)
+        for key in ("observation", "achieved_goal", "desired_goal")
+    }
+    actions = [
+        trained_policy(train(config, tmp_path, quiet=True).folder.path).act(observation)
+        for config in (quick_ppo, quick_ppo, quick_ppo.replace(seed=4))
+    ]
+    np.testing.assert_array_equal(actions[0], actions[1])
+    assert not np.array_equal(actions[0], actions[2])
+
+
+def test_a_drawn_seed_is_recorded(quick_ppo, tmp_path):
+    result = train(quick_ppo.replace(seed=None), tmp_path, quiet=True)
+    assert isinstance(result.folder.config().seed, int)
+
+
+def test_off_policy_learning_with_hindsight_runs(quick_sac, tmp_path):
+    result = train(quick_sac, tmp_path, quiet=True)
+    assert result.steps == 200
+    assert trained_policy(result.folder.path).name.startswith("sac")
+
+
+def test_normalisation_is_saved_and_used(quick_ppo, tmp_path):
+    result = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True)
+    assert result.folder.normalization.exists()
+    observation = {
+        key: np.full((1, 2), 0.3, np.float32)
+        for key in ("observation", "achieved_goal", "desired_goal")
+    }
+    with_statistics = trained_policy(result.folder.path).act(observation)
+    result.folder.normalization.unlink()
+    assert not np.array_equal(trained_policy(result.folder.path).act(observation), with_statistics)
+
+
+def test_ctrl_c_keeps_what_was_learned(quick_ppo, tmp_path, monkeypatch):
+    class CtrlC(BaseCallback):
+        def _on_step(self) -> bool:
+            if self.num_timesteps > 100:
+                raise KeyboardInterrupt
+            return True
+
+    monkeypatch.setattr(train_module, "BatchedTimeoutBootstrap", CtrlC)
+    result = train(quick_ppo, tmp_path, quiet=True)
+    assert result.interrupted
+    assert trained_policy(result.folder.path)
+
+
+def test_checkpoints_are_saved_on_the_way(quick_ppo, tmp_path, monkeypatch):
+    class Crash(BaseCallback):
+        def _on_step(self) -> bool:
+            if self.num_timesteps > 100:
+                raise RuntimeError("power cut")
+            return True
+
+    monkeypatch.setattr(train_module, "BatchedTimeoutBootstrap", Crash)
+    with pytest.raises(RuntimeError, match="power cut"):
+        train(quick_ppo, tmp_path, save_every=80, quiet=True)
+    assert trained_policy(tmp_path / "ppo" / "Test-Reach-v0_1")
+
+
+def test_training_stops_when_a_full_window_of_episodes_succeeds(quick_ppo, tmp_path, monkeypatch):
+    monkeypatch.setattr(train_module, "SUCCESS_WINDOW", 8)
+    # Every episode ends in failure or success; a target this low is met by the first success.
+    config = quick_ppo.replace(n_timesteps=100_000, target_success_rate=0.01, seed=0)
+    result = train(config, tmp_path, quiet=True)
+    assert result.steps < 100_000
+    assert result.success_rate >= 0.01
+
+
+def test_a_window_that_is_not_full_does_not_stop_training():
+    from collections import deque
+    from types import SimpleNamespace
+
+    stop = StopAtSuccess(0.9)
+    stop.model = SimpleNamespace(ep_success_buffer=deque([True] * 999, maxlen=1000))
+    stop._on_rollout_end()
+    assert stop._on_step()
+    stop.model.ep_success_buffer.append(True)
+    stop._on_rollout_end()
+    assert not stop._on_step()
+
+
+def test_linear_schedule_falls_to_zero():
+    schedule = LinearSchedule(3e-4)
+    assert schedule(1.0) == 3e-4
+    assert schedule(0.5) == pytest.approx(1.5e-4)
+    assert schedule(0.0) == 0
+
+
+def test_linear_learning_rate_survives_saving(quick_ppo, tmp_path):
+    result = train(quick_ppo.replace(learning_rate="lin_3e-4"), tmp_path, quiet=True)
+    assert trained_policy(result.folder.path)
+
+
+def test_threads_are_set_as_asked(quick_ppo, tmp_path):
+    train(quick_ppo, tmp_path, num_threads=1, quiet=True)
+    assert torch.get_num_threads() == 1
+
+
+def test_arguments_that_the_environment_refuses_are_named_before_a_folder_is_made(
+    quick_ppo, tmp_path
+):
+    with pytest.raises(UsageError, match=r"Test/Reach-v0 refuses .*'denze', should be"):
+        train(quick_ppo.replace(env_kwargs={"reward_type": "denze"}), tmp_path, quiet=True)
+    with pytest.raises(UsageError, match="device is 'gpu'"):
+        train(quick_ppo, tmp_path, device="gpu", quiet=True)
+    assert not list(tmp_path.iterdir())
+
+
+def test_learning_curve_is_a_small_picture(quick_ppo, tmp_path):
+    result = train(quick_ppo, tmp_path, quiet=True)
+    rows = read_learning_curve(result.folder)
+    assert rows[-1]["time/total_timesteps"] == 160
+    assert rows[-1]["time/wall_time"] > 0
+    picture = plot_learning_curve(result.folder)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size < 300_000
+
+
+def test_learning_curve_of_nothing_is_refused(quick_ppo, tmp_path):
+    result = train(quick_ppo, tmp_path, quiet=True)
+    result.folder.progress.write_text("time/total_timesteps,time/wall_time\n80,1.0\n")
+    with pytest.raises(UsageError, match="no row with a success rate"):
+        plot_learning_curve(result.folder)
+    result.folder.progress.unlink()
+    with pytest.raises(UsageError, match=r"progress\.csv is missing"):
+        plot_learning_curve(result.folder)

@@ -1,0 +1,1 @@
+"""Stable-Baselines3 on the environments: adapter, training, evaluation, film and plots."""

@@ -1,0 +1,53 @@
+"""The whole way in one command: train, evaluate, film, draw."""
+
+import time
+from pathlib import Path
+
+from training.config import TrainConfig
+from training.evaluate import Evaluation, evaluate, print_evaluation
+from training.plot import plot_learning_curve
+from training.policy import trained_policy
+from training.record import record
+from training.run_folder import RunFolder
+from training.train import TrainResult, train
+
+
+def demo(
+    config: TrainConfig,
+    log_folder: Path = Path("runs"),
+    *,
+    episodes: int = 1000,
+    device: str = "cpu",
+    num_threads: int | None = None,
+) -> tuple[RunFolder, Evaluation]:
+    """Trains as configured, evaluates, writes a video and a learning curve, and says where.
+
+    Args:
+        config: What to train, and how.
+        log_folder: Where run folders are made.
+        episodes: How many to evaluate on.
+        device: Torch device of the networks.
+        num_threads: Threads of torch.
+    """
+    start = time.perf_counter()
+    trained = train(config, log_folder, device=device, num_threads=num_threads)
+    print_training(trained)
+    policy = trained_policy(trained.folder.path, device=device)
+    result = evaluate(policy, episodes)
+    video, still = record(policy, trained.folder.path / "video.mp4")
+    curve = plot_learning_curve(trained.folder)
+    print_evaluation(policy, result)
+    print(f"success rate    {result.success_at_end.mean():.1%} of {episodes:,} episodes")
+    print(f"wall time       {time.perf_counter() - start:.0f} s, training {trained.seconds:.0f} s")
+    for name, path in (("video", video), ("picture", still), ("learning curve", curve)):
+        print(f"{name:<15} {path}")
+    return trained.folder, result
+
+
+def print_training(trained: TrainResult) -> None:
+    """Prints how training went, in a line."""
+    print(
+        f"{'interrupted' if trained.interrupted else 'trained'} after {trained.steps:,} steps in "
+        f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s, "
+        f"{trained.environment_share:.0%} of the time in the environments): {trained.folder.path}"
+    )

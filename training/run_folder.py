@@ -1,0 +1,192 @@
+"""A folder for each training run: never used twice, and it says what made it.
+
+runs/<algo>/<env id>_<number>/
+    config.yaml      the settings, readable by `rigid-envs train --config`
+    run.json         algorithm, environment, command, seed, git commit, time of start
+    versions.json    Python, platform and packages
+    progress.csv     the learning curve; events.out.tfevents.* the same for TensorBoard
+    model.zip        the policy, as of the last checkpoint
+    vecnormalize.pkl statistics of the observations, if they are normalised
+"""
+
+import io
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from training.config import TrainConfig, load_config
+from training.errors import UsageError
+
+PACKAGES = ("rigid-envs", "numpy", "numba", "gymnasium", "stable-baselines3", "torch")
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The files of one training run."""
+
+    path: Path
+    """The folder."""
+
+    @property
+    def model(self) -> Path:
+        """The policy, as of the last checkpoint."""
+        return self.path / "model.zip"
+
+    @property
+    def normalization(self) -> Path:
+        """Statistics of the observations; absent if they are not normalised."""
+        return self.path / "vecnormalize.pkl"
+
+    @property
+    def progress(self) -> Path:
+        """The learning curve."""
+        return self.path / "progress.csv"
+
+    def config(self) -> TrainConfig:
+        """The settings that the run was made with.
+
+        Raises:
+            UsageError: The folder holds no run, or its files are damaged.
+        """
+        description = self.path / "run.json"
+        try:
+            run = json.loads(description.read_text(encoding="utf-8"))
+            algo, env_id = run["algo"], run["env_id"]
+        except OSError:
+            raise UsageError(f"{self.path} is no run folder: run.json is missing") from None
+        except (ValueError, KeyError, TypeError):
+            raise UsageError(f"{description} is damaged: algo or env_id cannot be read") from None
+        return load_config(algo, env_id, self.path / "config.yaml")
+
+
+def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
+    """Makes the next free folder of the algorithm and environment, and describes the run in it.
+
+    Raises:
+        UsageError: The folder cannot be made.
+    """
+    number = 1 + max((n for n, _ in _runs(log_folder, config.algo, config.env_id)), default=0)
+    parent = _parent(log_folder, config.algo)
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+        path = _make_next(parent / _folder_name(config.env_id), number)
+    except OSError as error:
+        raise UsageError(f"cannot make a folder in {parent}: {error.strerror}") from None
+    run = {
+        "algo": config.algo,
+        "env_id": config.env_id,
+        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "seed": config.seed,
+        "git_commit": _git_commit(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    _write_text(path / "config.yaml", config.as_yaml())
+    _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")
+    _write_text(path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
+    return RunFolder(path)
+
+
+def latest_run(log_folder: Path, algo: str, env_id: str) -> RunFolder:
+    """The run with the highest number.
+
+    Raises:
+        UsageError: There is none.
+    """
+    runs = _runs(log_folder, algo, env_id)
+    if not runs:
+        raise UsageError(
+            f"no run of {algo} on {env_id} under {log_folder}; "
+            f"make one: rigid-envs train --algo {algo} --env {env_id}"
+        )
+    return RunFolder(max(runs)[1])
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[io.BufferedWriter]:
+    """A file to write that appears at `path` only once it is complete.
+
+    Until then, and for good if writing fails, what was there before stays.
+    """
+    unfinished = path.with_name(path.name + ".tmp")
+    try:
+        with unfinished.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _make_next(prefix: Path, number: int) -> Path:
+    """Makes the first folder <prefix>_<number> that does not exist, from `number` on."""
+    while True:
+        path = prefix.with_name(f"{prefix.name}_{number}")
+        try:
+            path.mkdir()
+            return path
+        except FileExistsError:  # another run took the number in the meantime
+            number += 1
+
+
+def _write_text(path: Path, text: str) -> None:
+    with written_whole(path) as file:
+        file.write(text.encode("utf-8"))
+
+
+def _parent(log_folder: Path, algo: str) -> Path:
+    return log_folder / algo
+
+
+def _folder_name(env_id: str) -> str:
+    return env_id.replace("/", "-").replace(":", "-")
+
+
+def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
+    """Number and path of each run of the algorithm on the environment."""
+    prefix = _folder_name(env_id) + "_"
+    return [
+        (int(path.name.removeprefix(prefix)), path)
+        for path in _parent(log_folder, algo).glob(f"{prefix}*")
+        if path.name.removeprefix(prefix).isdecimal()
+    ]
+
+
+def _versions() -> dict[str, Any]:
+    versions: dict[str, Any] = {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpu_count": os.cpu_count(),
+    }
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:  # run from a source tree that is not installed
+            versions[package] = None
+    return versions
+
+
+def _git_commit() -> str | None:
+    """The commit of this project's source tree; none if it is installed from elsewhere."""
+    source = Path(__file__).resolve().parents[1]
+    try:
+        answer = subprocess.run(
+            ["git", "-C", str(source), "rev-parse", "--show-toplevel", "HEAD"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    # A site-packages inside somebody's repository must not report that repository's commit.
+    top, commit = answer.stdout.splitlines()
+    return commit if Path(top).resolve() == source else None

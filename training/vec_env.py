@@ -1,0 +1,168 @@
+"""The vector environment as Stable-Baselines3 wants it.
+
+Stable-Baselines3 has its own `VecEnv` and no converter from Gymnasium's `VectorEnv`. The two differ
+in what they say at the end of an episode, and a silent slip there costs learning rather than an
+error. Nothing here loops over worlds in Python, except over those whose episode has just ended.
+"""
+
+import time
+from collections.abc import Sequence
+from copy import deepcopy
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+
+Observation = dict[str, np.ndarray]
+
+_NOTHING: dict[str, Any] = {}
+"""The info of every world that goes on: one object, since 4,096 worlds have 4,096 infos a step."""
+
+
+class RigidVecEnv(VecEnv):
+    """A Stable-Baselines3 `VecEnv` over a Gymnasium vector environment with dict observations.
+
+    At the end of an episode the info of its world holds `terminal_observation` (a copy),
+    `TimeLimit.truncated` and whatever the environment says of the last step, such as `is_success`.
+    All worlds live in one environment object, so attributes and methods are of all worlds at once.
+
+    Args:
+        envs: Vector environment with autoreset mode SAME_STEP; closed with this one.
+
+    Raises:
+        ValueError: The vector environment has another autoreset mode.
+    """
+
+    def __init__(self, envs: VectorEnv):
+        mode = envs.metadata.get("autoreset_mode")
+        if mode != AutoresetMode.SAME_STEP:
+            raise ValueError(f"autoreset_mode is {mode}, should be {AutoresetMode.SAME_STEP}")
+        self.envs = envs
+        self.seconds_in_envs = 0.0
+        """Wall time spent inside the vector environment's steps so far, in seconds."""
+        self._actions: np.ndarray | None = None
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> Observation:
+        """Starts new episodes in all worlds; world i gets the seed given to `seed` plus i."""
+        observation, infos = self.envs.reset(seed=self._seeds[0], options=self._shared_options())
+        self.reset_infos = _info_per_world(infos, np.arange(self.num_envs))
+        self._reset_seeds()
+        self._reset_options()
+        return _copied(observation)
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keeps the actions `(num_envs, action_dim)` for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Steps all worlds; those that end are reset and their observation is of the new episode.
+
+        Returns:
+            Observations `{key: (num_envs, k)}`, rewards `(num_envs,)` float32,
+            dones `(num_envs,)` bool, one info a world. None shares memory with the environment.
+        """
+        start = time.perf_counter()
+        observation, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+        self.seconds_in_envs += time.perf_counter() - start
+
+        dones = np.logical_or(terminated, truncated)
+        info_list = [_NOTHING] * self.num_envs
+        ended = np.flatnonzero(dones)
+        if ended.size:
+            last_infos = _info_per_world(infos["final_info"], ended)
+            new_infos = _info_per_world(infos, ended)
+            cut_short = (truncated & ~terminated)[ended].tolist()
+            for world, info, new_info, cut in zip(
+                ended.tolist(), last_infos, new_infos, cut_short, strict=True
+            ):
+                info["terminal_observation"] = _copied(infos["final_obs"][world])
+                info["TimeLimit.truncated"] = cut
+                info_list[world] = info
+                self.reset_infos[world] = new_info
+        return _copied(observation), np.array(rewards, dtype=np.float32), dones, info_list
+
+    def close(self) -> None:
+        """Closes the vector environment."""
+        self.envs.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """The one picture that shows some of the worlds."""
+        frame: Any = self.envs.render()
+        return [frame]
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The attribute of the vector environment, once for each index."""
+        return [self._find(attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Sets an attribute of the vector environment, for all worlds.
+
+        Raises:
+            ValueError: `indices` names some of the worlds only.
+        """
+        if set(self._get_indices(indices)) != set(range(self.num_envs)):
+            raise ValueError(
+                f"indices is {indices}, should be None: all worlds share {attr_name!r}"
+            )
+        setattr(self.envs.unwrapped, attr_name, value)
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Calls the method of the vector environment once; its result stands for each index."""
+        result = self._find(method_name)(*method_args, **method_kwargs)
+        return [result] * len(list(self._get_indices(indices)))
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None
+    ) -> list[bool]:
+        """Whether the vector environment is wrapped in `wrapper_class`, once for each index."""
+        wrapped = any(isinstance(layer, wrapper_class) for layer in self._layers())
+        return [wrapped] * len(list(self._get_indices(indices)))
+
+    def _layers(self) -> list[VectorEnv]:
+        """The vector environment's wrappers from the outside in, then the environment."""
+        layers = [self.envs]
+        while isinstance(layers[-1], VectorWrapper):
+            layers.append(layers[-1].env)
+        return layers
+
+    def _find(self, name: str) -> Any:
+        """The attribute of the outermost layer that has it: wrappers may override rewards."""
+        for layer in self._layers():
+            if hasattr(layer, name):
+                return getattr(layer, name)
+        raise AttributeError(f"{self.envs} has no attribute {name!r}")
+
+    def _shared_options(self) -> dict[str, Any] | None:
+        """The options of the next reset, which are of all worlds or of none."""
+        first = self._options[0]
+        if any(options is not first and options != first for options in self._options):
+            raise ValueError("options differ between worlds, should be the same for all")
+        return deepcopy(first) or None
+
+
+def _copied(observation: Observation) -> Observation:
+    return {key: np.array(value) for key, value in observation.items()}
+
+
+def _info_per_world(infos: dict[str, Any], worlds: np.ndarray) -> list[dict[str, Any]]:
+    """The infos of some worlds, one dict each, from arrays over all worlds."""
+    keys = [
+        key
+        for key, value in infos.items()
+        if isinstance(value, np.ndarray) and not key.startswith("_") and key != "final_obs"
+    ]
+    columns = [infos[key][worlds] for key in keys]
+    rows = [column.tolist() if column.ndim == 1 else list(column) for column in columns]
+    if not keys:
+        return [{} for _ in worlds]
+    return [dict(zip(keys, values, strict=True)) for values in zip(*rows, strict=True)]
