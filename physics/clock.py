@@ -14,6 +14,9 @@ from physics.pipeline import make_forces, make_substep
 from physics.stages.candidates import make_collision_step, make_search
 from physics.stages.kinematics import make_kinematics, place_statics
 
+# m, kg m/s or kg m^2/s in sum: beyond it a mover counts as diverged
+LARGEST = 1e50
+
 
 def cut(span: float, longest: float) -> int:
     """Number of equal substeps no longer than `longest` s that make up `span` s."""
@@ -40,13 +43,16 @@ def make_refresh(features: Features):
 
 @kernel
 def first_diverged(state, w):
-    """Index of the first mover of a world that isn't finite, plus 1; 0 if all are."""
+    """Index of the first mover of a world that isn't finite, plus 1; 0 if all are.
+
+    Forces hold squares of squares of speeds: a state that is too large for these counts as well.
+    """
     for i in range(state.mover.shape[1]):
         m = state.mover[w, i]
         total = 0.0
         for c in range(3):
-            total += m.position[c] + m.momentum[c] + m.angular_momentum[c]
-        if not math.isfinite(total):
+            total += abs(m.position[c]) + abs(m.momentum[c]) + abs(m.angular_momentum[c])
+        if not total < LARGEST:
             return i + 1
     return 0
 

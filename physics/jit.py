@@ -72,7 +72,7 @@ def entry(function: Any) -> Any:
 
 
 def _on_records(function: Any) -> Any:
-    """With NUMBA_DISABLE_JIT=1: the same function, with rows of arrays that have fields as names."""
+    """With NUMBA_DISABLE_JIT=1: the same function, on tables whose fields have names."""
 
     def records(argument: Any) -> Any:
         if isinstance(argument, tuple):

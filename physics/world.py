@@ -62,6 +62,7 @@ class World:
         self._model: Model
         self._model, self._features = build(scene, self.fidelity)
         self._check_step(allow_unstable)
+        self._find_kernels()
         self._scratch = Scratch.of(self._model)
         self._state = allocate(self._model, self._features, self.count)
         self._reset(np.ones(self.count, dtype=bool))
@@ -144,7 +145,7 @@ class World:
         self._run(span / substeps, substeps)
 
     def _run(self, h: float, substeps: int) -> None:
-        kernel = make_advance(self._features)
+        kernel = self._advance
         model, state, group = self._model, self._state, self.fidelity.collision_substeps
 
         def run(first: int, last: int) -> int:
@@ -181,9 +182,15 @@ class World:
         )
 
     def _settle(self) -> None:
-        """Brings candidates and forces up to a state that was set from outside."""
-        if self._state.world["stale"].any():
+        """Brings candidates and forces up to a state that was set from outside, for a look at it.
+
+        Such worlds stay marked: their first step works the forces out under its own commands, so
+        that looking changes no bit.
+        """
+        stale = self._state.world["stale"] != 0
+        if stale.any():
             self._run(self.fidelity.substep, 0)
+            self._state.world["stale"][stale] = 1
 
     # --- reading ------------------------------------------------------------------------------
 
@@ -241,7 +248,7 @@ class World:
     def read(self) -> Readout:
         """A copy of all poses and velocities, drives after the bodies, in one pass."""
         rows = np.empty((self.count, len(self._model.mover), WIDTH))
-        make_readout(self._features)(self._model, self._state, rows)
+        self._readout(self._model, self._state, rows)
         return Readout(rows)
 
     def kinetic_energy(self) -> Array:
@@ -453,6 +460,15 @@ class World:
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
 
+    def _find_kernels(self) -> None:
+        self._advance = make_advance(self._features)
+        self._readout = make_readout(self._features)
+
     def __getstate__(self) -> dict[str, Any]:
-        """Pickles the scene, fidelity and state; kernels are found again on loading."""
-        return self.__dict__.copy()
+        """All but the kernels, which are found again by the features."""
+        return {k: v for k, v in self.__dict__.items() if k not in ("_advance", "_readout")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Takes the attributes back and finds the kernels."""
+        self.__dict__.update(state)
+        self._find_kernels()

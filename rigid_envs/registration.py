@@ -14,5 +14,6 @@ def register() -> None:
                 entry_point="rigid_envs.env:RigidEnv",
                 vector_entry_point="rigid_envs.vector_env:RigidVectorEnv",
                 max_episode_steps=steps,
+                order_enforce=False,  # both kinds ask for a reset themselves
                 kwargs={"task": task},
             )

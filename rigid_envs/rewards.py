@@ -35,7 +35,7 @@ class Reward:
     scale: float
     weights: Mapping[str, float]
 
-    def success(self, apart: Array) -> Array:
+    def success(self, apart: Any) -> Any:
         """Whether goals at these distances [...] m agree."""
         return apart <= self.threshold
 

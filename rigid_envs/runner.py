@@ -138,7 +138,7 @@ class Runner:
             "desired_goal": desired,
         }
         self._apart = apart = distance(achieved, desired)
-        success = np.asarray(self.task.reward.success(apart))
+        success: Any = self.task.reward.success(apart)
         terms = self.task.terms(now, achieved, desired, apart)
         info: dict[str, Array] = {"is_success": success, "success": success}
         info |= {"out_of_bounds": outside, **terms}
@@ -157,14 +157,14 @@ class Runner:
             raise ValueError(f"action must be numbers of shape {shape}, got {actions!r}") from None
         if array.shape != shape:
             raise ValueError(f"action must have shape {shape}, got {array.shape}")
-        total = array.sum()
-        if total != total and np.isnan(array).any():  # the sum alone is the quicker look
+        clipped = np.minimum(np.maximum(array, -1.0), 1.0)  # NaN stays NaN
+        if np.isnan(clipped.sum()):  # a quicker look than at every number
             world, component = (int(i) for i in np.argwhere(np.isnan(array))[0])
             raise ValueError(
                 f"action must be numbers within [-1, 1], got NaN in world {world}, component "
                 f"{component} ({self.task.actions[component]})"
             )
-        return np.minimum(np.maximum(array, -1.0), 1.0)
+        return clipped
 
     def step(self, actions: Any) -> Step:
         """Advances every world by a frame."""

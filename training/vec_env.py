@@ -90,9 +90,9 @@ class RigidVecEnv(VecEnv):
         self.envs.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """The one picture that shows some of the worlds."""
-        frame: Any = self.envs.render()
-        return [frame]
+        """A picture of each world."""
+        frames: Any = self.envs.render()
+        return list(frames)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """The attribute of the vector environment, once for each index."""

@@ -1,6 +1,7 @@
-"""Environment steps a second of panda-gym's PandaPush-v3, one figure a round. Needs only panda-gym.
+"""Speed of panda-gym's PandaPush-v3: random actions, sparse reward, a reset after each episode.
 
-Arguments: number of rounds, seconds a round. It stands alone, to run in an environment of its own.
+It needs only panda-gym and stands alone, to run in an environment of its own. At each line on its
+standard input it steps for as many seconds as its argument says and prints the number of steps.
 """
 
 import sys
@@ -10,22 +11,20 @@ import gymnasium as gym
 import panda_gym  # noqa: F401  (registers the environments)
 
 
-def measure(rounds: int, seconds: float) -> list[float]:
-    """Random actions, sparse reward, reset at the end of each episode."""
+def serve(seconds: float) -> None:
+    """Takes a turn at each line, until there are no more."""
     env = gym.make("PandaPush-v3")
     env.reset(seed=0)
     actions = [env.action_space.sample() for _ in range(50)]
-    rates = []
-    for _ in range(rounds):
+    for _ in sys.stdin:
         steps, start = 0, perf_counter()
-        while (spent := perf_counter() - start) < seconds:
+        while perf_counter() - start < seconds:
             _, _, terminated, truncated, _ = env.step(actions[steps % 50])
             steps += 1
             if terminated or truncated:
                 env.reset()
-        rates.append(steps / spent)
-    return rates
+        print("steps", steps, flush=True)
 
 
 if __name__ == "__main__":
-    print(*measure(int(sys.argv[1]), float(sys.argv[2])))
+    serve(float(sys.argv[1]))

@@ -12,7 +12,7 @@ from functools import cache
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
 from physics.stages.kinematics import CENTER, PATH
-from physics.stages.relative import CORE, OFFSET, RADIUS, relative_pose
+from physics.stages.relative import OFFSET, relative_pose
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
 
 # columns of the scratch copy of an old list: what a candidate remembers, then its sample
@@ -29,8 +29,8 @@ def make_search(features):
     particles = features.particles
 
     @kernel
-    def distance(kind, x, y, z, rel):
-        a, b, c = rel[CORE], rel[CORE + 1], rel[CORE + 2]
+    def distance(side, x, y, z):
+        kind, a, b, c = side.kind, side.core[0], side.core[1], side.core[2]
         d = z
         if box and kind == BOX:
             d = box_distance(x, y, z, a, b, c)[0]
@@ -90,7 +90,7 @@ def make_search(features):
                 old[n, m] = state.lanes[o + (4 + m) * LANES]
 
         relative_pose(model, frame, rel, k)
-        kind, radius = side.kind, rel[RADIUS]
+        radius = side.radius
         n = 0
         cursor = 0
         nearest = 1e300
@@ -123,7 +123,7 @@ def make_search(features):
                     elif gap < nearest:
                         nearest = gap
             else:
-                gap = distance(kind, x, y, z, rel) - radius
+                gap = distance(side, x, y, z) - radius
                 if gap < skin:
                     m = n
                     n, cursor = keep(

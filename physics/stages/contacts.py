@@ -14,21 +14,10 @@ from physics.stages.friction import friction_force
 from physics.stages.kinematics import CENTER, turned
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.relative import (
-    CORE,
-    DAMPING,
-    FLOOR,
     FORCE,
-    FRICTION,
-    INVERSE_MASS,
     NORMAL_SUM,
     OFFSET,
-    OWNER_RADIUS,
-    RADIUS,
-    SHEAR_C,
-    SHEAR_K,
     SPEED,
-    STEP,
-    STIFFNESS,
     TORQUE,
     TURNING,
     relative_motion,
@@ -60,18 +49,19 @@ def make_loop(features, kind, report):
     surface_distance = {BOX: box_distance, CAPSULE: capsule_distance}.get(kind, sphere_distance)
 
     @lane_kernel
-    def loop(n, lanes, rel, rows):
+    def loop(n, lanes, rel, constants, h, rows):
         q00, q01, q02, q10, q11, q12, q20, q21, q22 = (
             rel[0], rel[1], rel[2], rel[3], rel[4], rel[5], rel[6], rel[7], rel[8],
         )  # fmt: skip
         tx, ty, tz = rel[OFFSET], rel[OFFSET + 1], rel[OFFSET + 2]
         vx, vy, vz = rel[SPEED], rel[SPEED + 1], rel[SPEED + 2]
         ox, oy, oz = rel[TURNING], rel[TURNING + 1], rel[TURNING + 2]
-        radius, owner_radius = rel[RADIUS], rel[OWNER_RADIUS]
-        ca, cb, cc = rel[CORE], rel[CORE + 1], rel[CORE + 2]
-        k, a, floor, inverse_mass = rel[STIFFNESS], rel[DAMPING], rel[FLOOR], rel[INVERSE_MASS]
-        shear_k, shear_c, mu, h = rel[SHEAR_K], rel[SHEAR_C], rel[FRICTION], rel[STEP]
-        mass_rate = 1.0 / (inverse_mass * h) if h > 0.0 else 0.0
+        radius, owner_radius = constants.radius, constants.owner_radius
+        ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
+        k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
+        shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
+        mu, inverse_mass = constants.friction, 1.0 / constants.pair_mass
+        mass_rate = constants.pair_mass / h if h > 0.0 else 0.0
         sum_fx = 0.0
         sum_fy = 0.0
         sum_fz = 0.0
@@ -164,7 +154,8 @@ def make_loop(features, kind, report):
             sum_tx += ry * fz - rz * fy
             sum_ty += rz * fx - rx * fz
             sum_tz += rx * fy - ry * fx
-            sum_normal += weight * normal
+            if not plane:
+                sum_normal += weight * normal
             if report:
                 rows[i, REPORT_OVERLAP] = overlap
                 rows[i, REPORT_POINT] = rx + tx
@@ -183,7 +174,7 @@ def make_loop(features, kind, report):
         rel[TORQUE] += sum_tx
         rel[TORQUE + 1] += sum_ty
         rel[TORQUE + 2] += sum_tz
-        rel[NORMAL_SUM] += sum_normal
+        rel[NORMAL_SUM] += sum_fz if plane else sum_normal
 
     return loop
 
@@ -203,26 +194,27 @@ def make_side(features, report):
     @stage
     def side(model, state, frame, rel, rows, w, k, h):
         relative_pose(model, frame, rel, k)
-        relative_motion(model, frame, rel, k, h)
-        kind = model.side[k].kind
+        relative_motion(model, frame, rel, k)
+        constants = model.side[k]
+        kind = constants.kind
         count = state.side[w, k].count
         chunks = state.sample_id.shape[1] // LANES
-        base = w * chunks + model.side[k].first_chunk
+        base = w * chunks + constants.first_chunk
         for c in range((count + LANES - 1) // LANES):
             o = (base + c) * fields * LANES
             lanes = state.lanes[o : o + fields * LANES]
             out = rows[c * LANES :]
             n = count if count < 3 else LANES
             if plane and kind == PLANE:
-                plane_loop(n, lanes, rel, out)
+                plane_loop(n, lanes, rel, constants, h, out)
             if sphere and kind == SPHERE:
-                sphere_loop(n, lanes, rel, out)
+                sphere_loop(n, lanes, rel, constants, h, out)
             if box and kind == BOX:
-                box_loop(n, lanes, rel, out)
+                box_loop(n, lanes, rel, constants, h, out)
             if capsule and kind == CAPSULE:
-                capsule_loop(n, lanes, rel, out)
+                capsule_loop(n, lanes, rel, constants, h, out)
             if particles and kind == PARTICLES:
-                particle_loop(n, lanes, rel, out)
+                particle_loop(n, lanes, rel, constants, h, out)
 
     return side
 

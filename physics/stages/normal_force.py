@@ -77,7 +77,7 @@ def damping_coefficient(restitution: float, law: str) -> float:
 
 
 def rest_speed(damping: float, gravity: float, omega: float) -> float:
-    """Floor of the impact speed, m/s: under its weight a body at rest is damped at half of critical.
+    """Floor of the impact speed, m/s: a body at rest under its weight is damped half critically.
 
     Args:
         damping: a of the law.
@@ -114,12 +114,14 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     turned = (memory < 0.0) & (approach > 0.0)
     speed = 0.0 if turned else abs(memory)
     speed = max(max(speed, approach), floor)
-    y = a * S
-    x = h * k * inverse_mass * y
-    r = speed * D
     outside = load + mass_rate * approach if memory != 0.0 else 0.0
     outside = min(max(outside, 0.0), k * max(overlap, 0.0))
-    force = (k * (speed * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * outside) / (
+    # a pressed contact is at rest under its load as a lying body is under its weight
+    slowest = max(speed, a * outside * math.sqrt(inverse_mass / k))
+    y = a * S
+    x = h * k * inverse_mass * y
+    r = slowest * D
+    force = (k * (slowest * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * outside) / (
         r * r + r * x + 0.5 * x * x
     )
     touching = s > 0.0

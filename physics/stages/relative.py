@@ -1,17 +1,14 @@
 """A side's geometry in the frame of its surface, where the surface is at rest.
 
 A scratch row holds it: rotation, offset, velocity and spin of the owner relative to the surface,
-then the numbers of the contact law, then the sums that the loops over contacts leave behind.
+then the sums of force, torque and normal force that the loops over contacts leave behind.
 """
 
 from physics.jit import stage
 from physics.shapes import PLANE
 from physics.stages.kinematics import CENTER, SPIN, VELOCITY, turned_back
 
-OFFSET, SPEED, TURNING = 9, 12, 15
-RADIUS, OWNER_RADIUS, CORE = 18, 19, 20
-STIFFNESS, DAMPING, FLOOR, INVERSE_MASS, SHEAR_K, SHEAR_C, FRICTION, STEP = range(23, 31)
-FORCE, TORQUE, NORMAL_SUM, RELATIVE = 31, 34, 37, 38
+OFFSET, SPEED, TURNING, FORCE, TORQUE, NORMAL_SUM, RELATIVE = 9, 12, 15, 18, 21, 24, 25
 
 
 @stage
@@ -36,16 +33,11 @@ def relative_pose(model, frame, rel, k):
             frame[a, CENTER + 1] - frame[b, CENTER + 1],
             frame[a, CENTER + 2] - frame[b, CENTER + 2],
         )
-    rel[RADIUS] = side.radius
-    rel[OWNER_RADIUS] = side.owner_radius
-    rel[CORE] = side.core[0]
-    rel[CORE + 1] = side.core[1]
-    rel[CORE + 2] = side.core[2]
 
 
 @stage
-def relative_motion(model, frame, rel, k, h):
-    """Velocity and spin of the owner as seen from the surface, and the numbers of the law."""
+def relative_motion(model, frame, rel, k):
+    """Velocity and spin of the owner as seen from the surface; clears the sums."""
     side = model.side[k]
     a, b = side.owner, side.surface
     if side.kind == PLANE:
@@ -70,13 +62,5 @@ def relative_motion(model, frame, rel, k, h):
         rel[TURNING], rel[TURNING + 1], rel[TURNING + 2] = turned_back(
             frame, b, frame[a, SPIN] - wx, frame[a, SPIN + 1] - wy, frame[a, SPIN + 2] - wz
         )
-    rel[STIFFNESS] = side.stiffness
-    rel[DAMPING] = side.damping
-    rel[FLOOR] = side.rest_speed
-    rel[INVERSE_MASS] = 1.0 / side.pair_mass
-    rel[SHEAR_K] = side.shear_stiffness
-    rel[SHEAR_C] = side.shear_damping
-    rel[FRICTION] = side.friction
-    rel[STEP] = h
     for c in range(FORCE, RELATIVE):
         rel[c] = 0.0

@@ -45,7 +45,7 @@ class Push(Task):
         return Scene(
             bodies=[Body(Box((HALF,) * 3), mass=MASS, position=(0, 0, HALF), material=material)],
             statics=[Ground(material=material)],
-            drives=[Drive(Sphere(FINGER), mass=0.2, force_limit=5.0, position=HOME)],
+            drives=[Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME)],
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:

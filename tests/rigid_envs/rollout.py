@@ -81,8 +81,21 @@ def assert_same(a: Any, b: Any) -> None:
     elif isinstance(a, np.ndarray):
         assert a.dtype == b.dtype
         if a.dtype == object:
-            return assert_same(a.tolist(), b.tolist())
-        np.testing.assert_array_equal(a, b)
+            assert_same(a.tolist(), b.tolist())
+        else:
+            np.testing.assert_array_equal(a, b)
     else:
         assert type(a) is type(b)
         assert a == b
+
+
+def assert_untouched(env: Any, before: dict[str, Any]) -> None:
+    """An environment still holds the state that `get_state` gave."""
+    after = env.get_state()
+    assert_same(_in_bytes(after), _in_bytes(before))
+
+
+def _in_bytes(state: dict[str, Any]) -> dict[str, Any]:
+    """With the world's arrays as bytes, since NaN doesn't equal NaN."""
+    world = {name: array.tobytes() for name, array in state["world"].state._asdict().items()}
+    return {**state, "world": world}

@@ -101,7 +101,9 @@ class ReachVectorEnv(VectorEnv):
         return (distance < THRESHOLD).astype(np.float32) - np.float32(1)
 
     def render(self):
-        return np.full((48, 64, 3), 200, np.uint8) if self.render_mode == "rgb_array" else None
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(np.full((48, 64, 3), 200, np.uint8) for _ in range(self.num_envs))
 
     def _start(self, worlds: np.ndarray) -> None:
         for world in worlds:
@@ -152,7 +154,8 @@ class ReachEnv(gym.Env):
         return self.worlds.compute_reward(achieved, desired, info)
 
     def render(self):
-        return self.worlds.render()
+        frames = self.worlds.render()
+        return frames if frames is None else frames[0]
 
 
 vector_keys = ("observation", "achieved_goal", "desired_goal")

@@ -234,12 +234,14 @@ def test_get_attr_and_set_attr_are_of_all_worlds():
         env.get_attr("colour")
 
 
-def test_render_shows_the_environment_s_picture():
+def test_render_shows_the_environment_s_pictures():
     env = make(render_mode="rgb_array")
     env.reset()
     assert env.render_mode == "rgb_array"
-    np.testing.assert_array_equal(env.render(), env.envs.render())
-    assert len(env.get_images()) == 1
+    frames = env.envs.render()
+    assert len(env.get_images()) == len(frames) == env.num_envs
+    np.testing.assert_array_equal(env.get_images()[0], frames[0])
+    assert env.render().ndim == 3
 
 
 def test_close_closes_the_environment():

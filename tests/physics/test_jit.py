@@ -1,0 +1,131 @@
+"""Compiled code is kept on disk and found again, unless a source has changed; without numba the same
+stages run as plain Python."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import physics
+from physics import World, jit
+from physics.reference import scenes
+
+PACKAGE = Path(physics.__file__).parent
+ROOT = PACKAGE.parent
+
+# a ball in free flight needs the fewest stages
+FALL = """
+from physics import Body, Scene, Sphere, World
+from physics.clock import make_advance
+world = World(Scene([Body(Sphere(0.1))]))
+world.advance(1.0)
+stats = make_advance(world.features).stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), world.position[0, 0, 2])
+"""
+
+PUSH = """
+from physics import World
+from physics.reference import scenes
+world = World(scenes.push_like())
+world.set_state(position=(0.0, 0.0, 0.0199), drive_position=(-0.0349, 0.0, 0.021))
+world.command_drives((0.3, 0.1, 0.0))
+world.advance(0.02)
+values = (world.position, world.orientation, world.linear_velocity, world.angular_velocity)
+values += (world.drive_position, world.contacts().force)
+print(*[repr(float(x)) for v in values for x in v.ravel()])
+"""
+
+
+def run(program, cache, root=ROOT, **variables):
+    """Numbers that a program prints in a process of its own."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(root),
+        "NUMBA_CACHE_DIR": str(cache),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        **variables,
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment, cwd=root, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return [float(x) for x in done.stdout.split()]
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package and a cache that has seen it once."""
+    root = tmp_path_factory.mktemp("copy")
+    shutil.copytree(PACKAGE, root / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    cache = root / "cache"
+    return root, cache, run(FALL, cache, root)
+
+
+def test_a_second_process_compiles_nothing(copied):
+    root, cache, (hits, misses, height) = copied
+    assert (hits, misses) == (0, 1)
+    files = {p: p.stat().st_mtime_ns for p in cache.rglob("*.nb*")}
+    assert files
+    assert run(FALL, cache, root) == [1.0, 0.0, height]
+    assert {p: p.stat().st_mtime_ns for p in cache.rglob("*.nb*")} == files
+
+
+def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
+    root, cache, (_, _, height) = copied
+    path = root / "physics" / "stages" / "gravity.py"
+    source = path.read_text()
+    line = "m.force[2] = model.mover[i].weight[2]"
+    assert line in source
+    path.write_text(source.replace(line, f"{line} * 2.0"))
+    assert run(FALL, cache, root) == pytest.approx([0.0, 1.0, 2.0 * height], rel=1e-12)
+    path.write_text(source)
+    assert run(FALL, cache, root) == [1.0, 0.0, height]
+
+
+@pytest.mark.parametrize(
+    "name", sorted(p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py"))
+)
+def test_an_edit_of_any_file_changes_the_key_of_the_cache(name, tmp_path, monkeypatch):
+    shutil.copytree(PACKAGE, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "_PACKAGE", tmp_path / "physics")
+    assert jit._hash_sources() == jit.SOURCES
+    with (tmp_path / "physics" / name).open("a") as file:
+        file.write("# edited\n")
+    assert jit._hash_sources() != jit.SOURCES
+
+
+def test_every_entry_point_carries_the_key_of_the_cache():
+    """Numba looks at the values in an entry's closure, and the hash of all sources is one."""
+    found = 0
+    for path in PACKAGE.rglob("*.py"):
+        source = path.read_text()
+        entries = source.count("@entry\n")
+        assert source.count("sources = SOURCES\n") == source.count("_ = sources\n") == entries, path
+        found += entries
+    assert found >= 2
+    world = World(scenes.push_like())
+    from physics.clock import make_advance
+
+    function = make_advance(world.features).py_func
+    cells = [c.cell_contents for c in function.__closure__]
+    assert jit.SOURCES in [c for c in cells if isinstance(c, int)]
+
+
+def test_only_one_file_names_the_options_of_numba():
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "jit.py":
+            assert "numba" not in "".join(
+                line for line in path.read_text().splitlines(True) if "import" in line
+            ), path
+
+
+def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path):
+    plain = run(PUSH, tmp_path, NUMBA_DISABLE_JIT="1")
+    compiled = run(PUSH, os.environ.get("NUMBA_CACHE_DIR", tmp_path))
+    assert len(plain) == len(compiled) > 20
+    np.testing.assert_allclose(plain, compiled, rtol=1e-9, atol=1e-9)

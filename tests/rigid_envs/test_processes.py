@@ -1,0 +1,94 @@
+"""Environments work in other processes, whatever threads the parent has run."""
+
+import functools
+import multiprocessing
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv
+from stable_baselines3.common.vec_env import SubprocVecEnv
+
+from tests.rigid_envs.rollout import PUSH, assert_same, make, make_vec, random_actions, steps_of
+
+WORKERS = 2
+ACTIONS = random_actions(55, WORKERS)
+# imports the package in the worker, where nothing is registered yet
+MAKE = functools.partial(gym.make, f"rigid_envs:{PUSH}")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def threads_have_run():
+    envs = make_vec(1024, threads=4)
+    envs.reset(seed=0)
+    for _ in range(5):
+        envs.step(envs.action_space.sample())
+    return envs
+
+
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+@pytest.mark.parametrize(
+    "context", [c for c in ("fork", "spawn") if c in multiprocessing.get_all_start_methods()]
+)
+def test_async_vector_env_says_what_the_native_one_says(context):
+    native = make_vec(WORKERS)
+    envs = AsyncVectorEnv([MAKE] * WORKERS, context=context)
+    try:
+        assert_same(envs.reset(seed=7), native.reset(seed=7))
+        for actions in ACTIONS:
+            assert_same(envs.step(actions), native.step(actions))
+    finally:
+        envs.close()
+
+
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
+def test_many_worlds_run_on_threads_in_a_forked_process(threads_have_run):
+    """The parent's pool of threads doesn't come along."""
+    actions = random_actions(3, 1024)
+    twin = make_vec(1024, threads=4)
+    twin.set_state(threads_have_run.get_state())
+    expected = [result[1].sum() for result in steps_of(threads_have_run, actions)]
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+
+    def work():
+        sender.send([result[1].sum() for result in steps_of(twin, actions)])
+
+    process = context.Process(target=work)
+    process.start()
+    try:
+        assert receiver.poll(60), "the forked process hangs"
+        assert receiver.recv() == expected
+    finally:
+        process.kill()
+        process.join()
+
+
+def test_subproc_vec_env_says_what_the_single_one_says():
+    envs = SubprocVecEnv([MAKE] * WORKERS)
+    try:
+        envs.seed(7)
+        observation = envs.reset()
+        alone = make()
+        assert_same({k: v[1] for k, v in observation.items()}, dict(alone.reset(seed=8)[0]))
+        for actions in ACTIONS[:49]:
+            observation, rewards, dones, infos = envs.step(actions)
+            seen, reward, *_, info = alone.step(actions[1])
+            assert_same({k: v[1] for k, v in observation.items()}, seen)
+            assert rewards[1] == reward
+            assert infos[1]["is_success"] == info["is_success"]
+            assert not dones.any()
+        goals = observation["desired_goal"]
+        observation, rewards, dones, infos = envs.step(ACTIONS[49])
+        assert dones.all()
+        for world, info in enumerate(infos):
+            assert info["TimeLimit.truncated"]
+            np.testing.assert_array_equal(
+                info["terminal_observation"]["desired_goal"], goals[world]
+            )
+        achieved = np.stack([info["terminal_observation"]["achieved_goal"] for info in infos])
+        relabelled = envs.env_method("compute_reward", achieved, goals, [{}] * WORKERS)
+        np.testing.assert_array_equal(relabelled[0], rewards)
+    finally:
+        envs.close()
