@@ -50,7 +50,7 @@ def _engines() -> dict[str, Make]:
     return {**presets, **{f"MuJoCo {1e3 * h:g} ms": partial(theirs, h) for h in steps}}
 
 
-def slide(half_extents: tuple[float, ...], speed: float, make: Make) -> float:
+def slide(half_extents: tuple[float, float, float], speed: float, make: Make) -> float:
     """Error of the distance in which a block slides to rest."""
     world = make(block_on_ground(half_extents, FRICTION, mass=1.0))
     world.advance(1.0)

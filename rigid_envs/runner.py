@@ -127,7 +127,7 @@ class Runner:
         values[:, split:] = self.task.achieved(now)
         over = (values < self._low) | (values > self._high)
         if over.any():
-            outside = over.any(axis=1)
+            outside: Array = np.any(over, axis=1)
             np.clip(values, self._low, self._high, out=values)
         else:
             outside = np.zeros(self.count, dtype=bool)
@@ -138,10 +138,13 @@ class Runner:
             "desired_goal": desired,
         }
         self._apart = apart = distance(achieved, desired)
-        success: Any = self.task.reward.success(apart)
-        terms = self.task.terms(now, achieved, desired, apart)
-        info: dict[str, Array] = {"is_success": success, "success": success}
-        info |= {"out_of_bounds": outside, **terms}
+        success: Array = self.task.reward.success(apart)
+        info: dict[str, Array] = {
+            "is_success": success,
+            "success": success,
+            "out_of_bounds": outside,
+            **self.task.terms(now, achieved, desired, apart),
+        }
         return observation, info
 
     def check_actions(self, actions: Any) -> Array:

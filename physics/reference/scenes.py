@@ -32,7 +32,7 @@ def _on_ground(
 
 
 def block_on_ground(
-    half_extents: Vector = CUBE.half_extents,
+    half_extents: tuple[float, float, float] = CUBE.half_extents,
     friction: float = 0.5,
     restitution: float = 0.0,
     angle: float = 0.0,
@@ -42,7 +42,7 @@ def block_on_ground(
     """A block of 0.1 kg that stands on a level ground, or on one inclined by `angle` rad."""
     material = Material(friction, restitution, stiffness)
     gravity = tilted_gravity(angle)
-    return _on_ground(Box(tuple(half_extents)), half_extents[2], material, gravity, **body)
+    return _on_ground(Box(half_extents), half_extents[2], material, gravity, **body)
 
 
 def sphere_on_ground(
@@ -105,17 +105,18 @@ def two_cubes(
 
 
 def torque_free_box(
-    angular_velocity: Vector = (3.0, 0.0, 5.0), half_extents: Vector = (0.03, 0.02, 0.01)
+    angular_velocity: Vector = (3.0, 0.0, 5.0),
+    half_extents: tuple[float, float, float] = (0.03, 0.02, 0.01),
 ) -> Scene:
     """A box that spins in free space; its moments rise from x to z."""
-    body = Body(Box(tuple(half_extents)), mass=0.1, angular_velocity=angular_velocity)
+    body = Body(Box(half_extents), mass=0.1, angular_velocity=angular_velocity)
     return Scene([body], [Ground(height=FAR_BELOW)], gravity=(0.0, 0.0, 0.0))
 
 
 def settled(
     scene: Scene, fidelity: str | Fidelity = "balanced", count: int = 1, time: float = 1.0
 ) -> World:
-    """Worlds of a scene after `time` s, in which what lies on the ground sinks in and comes to rest."""
+    """Worlds of a scene after `time` s, in which what lies on the ground comes to rest."""
     world = World(scene, fidelity, count)
     world.advance(time)
     return world

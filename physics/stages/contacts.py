@@ -242,13 +242,14 @@ def make_contacts(features):
                 if model.side[k].kind != PLANE:
                     fx, fy, fz = turned(frame, b, fx, fy, fz)
                     tx, ty, tz = turned(frame, b, tx, ty, tz)
-                m = state.mover[w, a]
-                m.force[0] += fx
-                m.force[1] += fy
-                m.force[2] += fz
-                m.torque[0] += tx
-                m.torque[1] += ty
-                m.torque[2] += tz
+                if a < movers:  # a static may carry samples as well
+                    m = state.mover[w, a]
+                    m.force[0] += fx
+                    m.force[1] += fy
+                    m.force[2] += fz
+                    m.torque[0] += tx
+                    m.torque[1] += ty
+                    m.torque[2] += tz
                 if reaction and b < movers:
                     dx = frame[a, CENTER] - frame[b, CENTER]
                     dy = frame[a, CENTER + 1] - frame[b, CENTER + 1]

@@ -32,14 +32,16 @@ def test_an_unknown_preset_is_named_with_the_nearest():
 
 @pytest.mark.parametrize("value", [None, 3, {"substep": 1e-3}, Fidelity])
 def test_what_is_no_fidelity_is_refused(value):
-    with pytest.raises(TypeError, match="fidelity must be one of.*got"):
+    with pytest.raises(TypeError, match=r"fidelity must be one of.*got"):
         resolve(value)
 
 
 @pytest.mark.parametrize("field", ["law", "geometry", "damping"])
 @pytest.mark.parametrize("value", ["impuls", None, 3])
 def test_an_unknown_choice_is_named_with_the_valid_ones(field, value):
-    with pytest.raises(ValueError, match=rf"Fidelity\.{field} must be one of \[.*\], got {value!r}"):
+    with pytest.raises(
+        ValueError, match=rf"Fidelity\.{field} must be one of \[.*\], got {value!r}"
+    ):
         Fidelity(**{field: value})
 
 

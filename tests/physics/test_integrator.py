@@ -57,11 +57,15 @@ def test_free_flight_is_a_parabola_to_round_off(fidelity):
 
 def test_a_tumbling_body_flies_along_the_same_parabola():
     spin, gravity = (30.0, -20.0, 10.0), np.array([0.0, 0.0, -9.81])
-    scene = scenes.block_on_ground((0.03, 0.02, 0.01), position=(0.0, 0.0, 10.0), angular_velocity=spin)
+    scene = scenes.block_on_ground(
+        (0.03, 0.02, 0.01), position=(0.0, 0.0, 10.0), angular_velocity=spin
+    )
     world = World(scene)
     world.advance(1.0)
     np.testing.assert_allclose(
-        world.position[0, 0], closed_forms.ballistic((0, 0, 10), np.zeros(3), gravity, 1.0), atol=1e-12
+        world.position[0, 0],
+        closed_forms.ballistic((0, 0, 10), np.zeros(3), gravity, 1.0),
+        atol=1e-12,
     )
 
 
@@ -70,7 +74,9 @@ def test_a_ball_keeps_its_spin_and_turns_by_it():
     world = World(scene)
     world.advance(1.0)
     np.testing.assert_array_equal(world.angular_velocity[0, 0], (0.0, 0.0, 2.0))
-    np.testing.assert_allclose(world.orientation[0, 0], (0, 0, np.sin(1.0), np.cos(1.0)), atol=1e-13)
+    np.testing.assert_allclose(
+        world.orientation[0, 0], (0, 0, np.sin(1.0), np.cos(1.0)), atol=1e-13
+    )
 
 
 def test_a_torque_free_box_follows_jacobi_s_elliptic_functions():
@@ -92,7 +98,9 @@ def test_rotation_converges_with_the_square_of_the_step():
     def end(step):
         world = World(scene, Fidelity(substep=step))
         world.advance(0.5)
-        return np.concatenate([spin_in_body(world), rotate(world.orientation[0, 0], np.eye(3)).ravel()])
+        return np.concatenate(
+            [spin_in_body(world), rotate(world.orientation[0, 0], np.eye(3)).ravel()]
+        )
 
     exact = jacobi_spin(moments_of(scene), np.array([3.0, 0.0, 5.0]), np.array([0.5]))[0]
     fine = end(0.125e-3)

@@ -32,16 +32,26 @@ def test_a_lattice_of_particles_converges_to_the_solid(name):
     assert len(points) * cell == pytest.approx(shape.volume, rel=0.02)
     particles = mass.of_particles(points, np.full(len(points), 7.0 / len(points)))
     np.testing.assert_allclose(particles.center, 0.0, atol=1e-12)
-    np.testing.assert_allclose(particles.inertia, np.diag(shape.inertia(7.0)), rtol=0.02, atol=1e-12)
+    np.testing.assert_allclose(
+        particles.inertia, np.diag(shape.inertia(7.0)), rtol=0.02, atol=1e-12
+    )
 
 
 def test_the_parallel_axis_theorem_agrees_with_the_sum_over_particles():
     rng = np.random.default_rng(0)
-    points, masses, offset = rng.normal(size=(20, 3)), rng.uniform(1, 2, 20), np.array([1.0, 2.0, -3.0])
+    points, masses, offset = (
+        rng.normal(size=(20, 3)),
+        rng.uniform(1, 2, 20),
+        np.array([1.0, 2.0, -3.0]),
+    )
     body = mass.of_particles(points, masses)
     r = points - (body.center + offset)
-    about = np.einsum("n,nk,nk->", masses, r, r) * np.eye(3) - np.einsum("n,ni,nj->ij", masses, r, r)
-    np.testing.assert_allclose(mass.parallel_axis(body.inertia, body.mass, offset), about, rtol=1e-12)
+    about = np.einsum("n,nk,nk->", masses, r, r) * np.eye(3) - np.einsum(
+        "n,ni,nj->ij", masses, r, r
+    )
+    np.testing.assert_allclose(
+        mass.parallel_axis(body.inertia, body.mass, offset), about, rtol=1e-12
+    )
 
 
 def test_eight_small_boxes_make_up_a_large_one():
@@ -57,7 +67,9 @@ def test_eight_small_boxes_make_up_a_large_one():
 
 def test_a_part_that_is_turned_brings_its_turned_tensor():
     turn = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    part = mass.MassProperties(2.0, np.zeros(3), np.diag(mass.box_inertia(2.0, np.array([1, 2, 3]))))
+    part = mass.MassProperties(
+        2.0, np.zeros(3), np.diag(mass.box_inertia(2.0, np.array([1, 2, 3])))
+    )
     whole = mass.combine([part], [turn])
     expected = np.diag(mass.box_inertia(2.0, np.array([2, 1, 3])))
     np.testing.assert_allclose(whole.inertia, expected, atol=1e-12)

@@ -47,7 +47,9 @@ def test_the_printed_matrix_of_the_lesson_takes_a_body_frame_spin():
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 0.2999999, 0.3000001, 1.0, 3.1, 20.0])
 def test_a_turn_is_the_exponential_map_in_the_world_frame(angle):
     axes = SPINS / np.linalg.norm(SPINS, axis=-1, keepdims=True)
-    turned = np.array([rotation.turn(*q, *a) for q, a in zip(QUATERNIONS, angle * axes, strict=True)])
+    turned = np.array(
+        [rotation.turn(*q, *a) for q, a in zip(QUATERNIONS, angle * axes, strict=True)]
+    )
     expected = (Rotation.from_rotvec(angle * axes) * Rotation.from_quat(QUATERNIONS)).as_quat()
     sign = np.sign(np.sum(turned * expected, axis=-1, keepdims=True))
     np.testing.assert_allclose(turned, sign * expected, atol=4e-15)
@@ -55,7 +57,9 @@ def test_a_turn_is_the_exponential_map_in_the_world_frame(angle):
 
 def test_conversions_agree_with_scipy():
     np.testing.assert_allclose(
-        rotation.rotation_matrix(QUATERNIONS), Rotation.from_quat(QUATERNIONS).as_matrix(), atol=1e-15
+        rotation.rotation_matrix(QUATERNIONS),
+        Rotation.from_quat(QUATERNIONS).as_matrix(),
+        atol=1e-15,
     )
     product = rotation.multiply(QUATERNIONS, QUATERNIONS[::-1])
     expected = (Rotation.from_quat(QUATERNIONS) * Rotation.from_quat(QUATERNIONS[::-1])).as_quat()

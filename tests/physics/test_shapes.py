@@ -130,7 +130,8 @@ def test_distance_and_normal_agree_with_brute_force(name):
         # the normal is the gradient of the distance
         step = 1e-6 * np.eye(3)
         slope = [
-            (distance(*(point + s), *core)[0] - distance(*(point - s), *core)[0]) / 2e-6 for s in step
+            (distance(*(point + s), *core)[0] - distance(*(point - s), *core)[0]) / 2e-6
+            for s in step
         ]
         np.testing.assert_allclose(normal, slope, atol=1e-4)
 

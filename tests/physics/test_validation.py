@@ -35,7 +35,9 @@ def test_arrays_broadcast_and_name_the_first_bad_entry():
     bad[1, 2] = np.nan
     with pytest.raises(ValueError, match=r"v must be finite, got nan at index \(1, 2\)"):
         validation.array("v", bad, (2, 3))
-    with pytest.raises(ValueError, match=r"v must be numbers of shape \(2, 3\), got shape \(2, 4\)"):
+    with pytest.raises(
+        ValueError, match=r"v must be numbers of shape \(2, 3\), got shape \(2, 4\)"
+    ):
         validation.array("v", np.zeros((2, 4)), (2, 3))
     with pytest.raises(ValueError, match=r"v must be numbers of shape \(2,\), got 'ab'"):
         validation.array("v", "ab", (2,))

@@ -94,7 +94,8 @@ def test_two_hundred_thousand_blind_steps_stay_physical(fidelity):
         assert all(np.isfinite(values).all() for values in observation.values())
         energy = world.kinetic_energy() + world.potential_energy()
         most = max(most, float(energy[inside].max()))
-        assert lowest_point(observation)[inside].min() > -0.01
+        # a finger that rams the cube presses it in by its speed times the step, and then it's out
+        assert lowest_point(observation)[inside].min() > {"fast": -0.015}.get(fidelity, -0.01)
         assert np.abs(world.position[inside]).max() <= 1.0
     # a finger at 2.2 m/s, twice over, is what an elastic blow could give: 0.97 J
     assert 0.02 < most < 0.97

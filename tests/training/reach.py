@@ -123,7 +123,7 @@ class ReachVectorEnv(VectorEnv):
 class ReachEnv(gym.Env):
     """The same as a single environment: a batch of one."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 25}
 
     def __init__(self, render_mode: str | None = None, **kwargs: Any):
         self.render_mode = render_mode
