@@ -8,7 +8,7 @@ runs under several Python threads at once, and takes any number of threads on an
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 from physics.validation import integer
 
@@ -44,4 +44,8 @@ def share_out(run: Callable[[int, int], int], count: int, threads: int) -> int:
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="worlds")
     others = [_pools[threads].submit(work) for _ in range(threads - 1)]
-    return work() + sum(other.result() for other in others)
+    try:
+        failed = work()
+    finally:  # no thread may still write when the caller hears of an error
+        wait(others)
+    return failed + sum(other.result() for other in others)
