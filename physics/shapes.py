@@ -8,8 +8,9 @@ a defined normal; its outer faces stay where the user put them.
 Samples carry weights. A body's contact stiffness is shared out by them, and they are fixed, so the
 sink under a load depends neither on the number of samples nor on the number that touch. A box's
 weight is spread over corners and edges such that each face has 1 in sum, each edge 3/8 and each
-corner 1/8, at every spacing that samples edges (corners alone have 1/4 each). The inside of a face carries no sample in the `shape` geometry: the
-first touch with it is always a corner or an edge of the other body, which has its own.
+corner 1/8, at every spacing that samples edges (corners alone have 1/4 each). The inside of a face
+carries no sample in the `shape` geometry: the first touch with it is always a corner or an edge of
+the other body, which has its own.
 """
 
 import math

@@ -2,8 +2,15 @@
 
 from functools import cache
 
-from physics.jit import stage
+from physics.jit import kernel, stage
 from physics.stages.kinematics import CENTER, VELOCITY
+
+
+@kernel
+def servo_force(constants, ahead, faster):
+    """Force in N along an axis; the reference is `ahead` by m and `faster` by m/s."""
+    pull = constants.servo_stiffness * ahead + constants.servo_damping * faster
+    return min(max(pull, -constants.force_limit), constants.force_limit)
 
 
 @cache
@@ -18,13 +25,22 @@ def make_drives(features):
                 m, constants = state.mover[w, i], model.mover[i]
                 if constants.turns:
                     continue
-                limit = constants.force_limit
-                for c in range(3):
-                    speed = m.reference_velocity[c]
-                    m.reference[c] += h * speed
-                    pull = constants.servo_stiffness * (
-                        m.reference[c] - frame[i, CENTER + c]
-                    ) + constants.servo_damping * (speed - frame[i, VELOCITY + c])
-                    m.force[c] += min(max(pull, -limit), limit)
+                # axis by axis and not in a loop: three turns would become a masked vector store,
+                # which the next load has to wait for
+                vx, vy, vz = (
+                    m.reference_velocity[0],
+                    m.reference_velocity[1],
+                    m.reference_velocity[2],
+                )
+                x = m.reference[0] + h * vx
+                y = m.reference[1] + h * vy
+                z = m.reference[2] + h * vz
+                m.reference[0] = x
+                m.reference[1] = y
+                m.reference[2] = z
+                ux, uy, uz = frame[i, VELOCITY], frame[i, VELOCITY + 1], frame[i, VELOCITY + 2]
+                m.force[0] += servo_force(constants, x - frame[i, CENTER], vx - ux)
+                m.force[1] += servo_force(constants, y - frame[i, CENTER + 1], vy - uy)
+                m.force[2] += servo_force(constants, z - frame[i, CENTER + 2], vz - uz)
 
     return drives

@@ -17,8 +17,16 @@ def relative_pose(model, frame, rel, k):
     side = model.side[k]
     a, b = side.owner, side.surface
     if side.kind == PLANE:
-        for c in range(9):
-            rel[c] = frame[a, c]
+        # one by one: a vector load of what was just stored in single numbers has to wait for them
+        rel[0] = frame[a, 0]
+        rel[1] = frame[a, 1]
+        rel[2] = frame[a, 2]
+        rel[3] = frame[a, 3]
+        rel[4] = frame[a, 4]
+        rel[5] = frame[a, 5]
+        rel[6] = frame[a, 6]
+        rel[7] = frame[a, 7]
+        rel[8] = frame[a, 8]
         rel[OFFSET] = frame[a, CENTER]
         rel[OFFSET + 1] = frame[a, CENTER + 1]
         rel[OFFSET + 2] = frame[a, CENTER + 2] - side.core[0]
@@ -62,5 +70,10 @@ def relative_motion(model, frame, rel, k):
         rel[TURNING], rel[TURNING + 1], rel[TURNING + 2] = turned_back(
             frame, b, frame[a, SPIN] - wx, frame[a, SPIN + 1] - wy, frame[a, SPIN + 2] - wz
         )
-    for c in range(FORCE, RELATIVE):
-        rel[c] = 0.0
+    rel[FORCE] = 0.0
+    rel[FORCE + 1] = 0.0
+    rel[FORCE + 2] = 0.0
+    rel[TORQUE] = 0.0
+    rel[TORQUE + 1] = 0.0
+    rel[TORQUE + 2] = 0.0
+    rel[NORMAL_SUM] = 0.0
