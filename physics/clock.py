@@ -34,6 +34,7 @@ def make_refresh(features: Features):
     def refresh(model, state, frame, rel, rows, old, w):
         kinematics(model, state, frame, w)
         for k in range(model.side.shape[0]):
+            state.side[w, k].count = 0  # what an earlier look left behind doesn't count
             search(model, state, frame, rel, old, w, k)
         forces(model, state, frame, rel, rows, w, 0.0, state.world[w].time)
         state.world[w].stale = 0
@@ -80,6 +81,7 @@ def make_advance(features: Features):
             if state.world[w].diverged != 0:
                 continue
             start = state.world[w].time
+            state.world[w].overflow = 0
             if state.world[w].stale != 0:
                 refresh(model, state, frame, rel, rows, old, w)
             done = 0

@@ -107,13 +107,11 @@ def _pair_material(a: Material, b: Material) -> tuple[float, float, float | None
 
 
 def _spacing(solid: Solid, scene: Scene, fidelity: Fidelity) -> float:
-    """Sample spacing in m; statics and drives are sampled as finely as the smallest body."""
+    """Sample spacing in m, for the smallest body: it would fall between coarser samples."""
     if isinstance(solid, Ground):
         return math.inf
     widths = [body.shape.width for body in scene.bodies]
-    own = solid.shape.width
-    width = own if isinstance(solid, Body) else min([own, *widths])
-    return fidelity.spacing * width
+    return fidelity.spacing * min([solid.shape.width, *widths])
 
 
 def _sides(scene: Scene, fidelity: Fidelity) -> Iterator[Side]:

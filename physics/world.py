@@ -101,7 +101,7 @@ class World:
         if bodies:
             velocity = np.array([b.linear_velocity for b in bodies])
             spin = np.array([b.angular_velocity for b in bodies])
-            state.mover["momentum"][worlds, : self._bodies] = velocity / self._mass[:, None]
+            state.mover["momentum"][worlds, : self._bodies] = velocity / self._inverse_mass[:, None]
             turn = np.array([b.orientation for b in bodies])
             state.mover["angular_momentum"][worlds, : self._bodies] = self._spin_momentum(
                 turn, spin
@@ -112,7 +112,7 @@ class World:
         self._forget(worlds)
 
     @property
-    def _mass(self) -> Array:
+    def _inverse_mass(self) -> Array:
         """Inverse masses [bodies]."""
         return self._model.mover["inverse_mass"][: self._bodies]
 
@@ -189,8 +189,10 @@ class World:
         """
         stale = self._state.world["stale"] != 0
         if stale.any():
-            self._run(self.fidelity.substep, 0)
-            self._state.world["stale"][stale] = 1
+            try:
+                self._run(self.fidelity.substep, 0)
+            finally:
+                self._state.world["stale"][stale] = 1
 
     # --- reading ------------------------------------------------------------------------------
 
@@ -211,18 +213,20 @@ class World:
 
     @property
     def position(self) -> Array:
-        """[count, bodies, 3] m, centres of mass, read-only."""
+        """[count, bodies, 3] m, centres of mass: a read-only view that follows the state."""
         return self._read(self._state.mover["position"][:, : self._bodies])
 
     @property
     def orientation(self) -> Array:
-        """[count, bodies, 4] unit quaternions x y z w, read-only."""
+        """[count, bodies, 4] unit quaternions x y z w: a read-only view that follows the state."""
         return self._read(self._state.mover["orientation"][:, : self._bodies])
 
     @property
     def linear_velocity(self) -> Array:
         """[count, bodies, 3] m/s, world frame."""
-        return self._read(self._state.mover["momentum"][:, : self._bodies] * self._mass[:, None])
+        return self._read(
+            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[:, None]
+        )
 
     @property
     def angular_velocity(self) -> Array:
@@ -236,7 +240,7 @@ class World:
 
     @property
     def drive_position(self) -> Array:
-        """[count, drives, 3] m, read-only."""
+        """[count, drives, 3] m: a read-only view that follows the state."""
         return self._read(self._state.mover["position"][:, self._bodies :])
 
     @property
@@ -254,7 +258,7 @@ class World:
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""
         momentum = self._state.mover["momentum"][:, : self._bodies]
-        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._mass)
+        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._inverse_mass)
         angular = self._state.mover["angular_momentum"][:, : self._bodies]
         rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
         return 0.5 * (translation + rotation)
@@ -417,7 +421,9 @@ class World:
         if "orientation" in new:
             state.mover["orientation"][mask, :bodies] = new["orientation"]
         if "linear_velocity" in new:
-            state.mover["momentum"][mask, :bodies] = new["linear_velocity"] / self._mass[:, None]
+            state.mover["momentum"][mask, :bodies] = (
+                new["linear_velocity"] / self._inverse_mass[:, None]
+            )
         if spin is not None:
             turn = state.mover["orientation"][mask, :bodies]
             state.mover["angular_momentum"][mask, :bodies] = self._spin_momentum(turn, spin)

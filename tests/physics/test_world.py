@@ -542,3 +542,15 @@ def test_a_step_that_is_too_long_is_named_as_the_cause():
 
     with pytest.raises(SimulationDiverged, match=r"substep of 0\.002 s is longer than the largest"):
         land_again_and_again()
+
+
+def test_looking_at_a_state_just_set_changes_no_bit_of_what_follows():
+    worlds = [World(scenes.push_like()) for _ in range(2)]
+    for world in worlds:
+        world.set_state(position=(0.0, 0.0, 0.0195), linear_velocity=(0.3, 0.0, -0.1))
+    worlds[0].contacts(0)
+    worlds[0].penetration()
+    for world in worlds:
+        world.advance(0.1)
+    np.testing.assert_array_equal(worlds[0].position, worlds[1].position)
+    np.testing.assert_array_equal(worlds[0].angular_velocity, worlds[1].angular_velocity)
