@@ -16,7 +16,7 @@ which `damping_coefficient` solves for a. Two details make the discrete law as g
 - The kick of a step is the mean force over the step centred at the present position, along which
   the overlap moves by b = h |u| / 2 either way: where it crosses zero, the mean of max(0, d) is
   (d + b)^2 / (4 b). Restitution no longer depends on where in a step the touch falls: at
-  omega h = 0.2 and e = 0.5 the spread over all phases is 9e-6, without it 1.7e-3.
+  omega h = 0.2 and e = 0.5 the spread over all phases was 9e-6 when tried, without it 1.7e-3.
 
 The impact speed of a contact that lasts starts anew whenever it turns from separating to
 approaching, with a floor at rest, so that a body that has landed is damped by its present motion.

@@ -27,7 +27,6 @@ from tests.rigid_envs.rollout import (
     toward_cube,
 )
 
-pytest.importorskip("pygame")
 ACTIONS = random_actions(EPISODE, 1)[:, 0]
 ZERO = np.zeros(3, dtype=np.float32)
 

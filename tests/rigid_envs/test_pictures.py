@@ -7,6 +7,7 @@ import warnings
 
 import gymnasium as gym
 import numpy as np
+import pygame
 import pytest
 from gymnasium.wrappers import RecordVideo
 from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
@@ -21,8 +22,6 @@ from tests.rigid_envs.rollout import (
     steps_of,
     toward_cube,
 )
-
-pygame = pytest.importorskip("pygame")
 
 FRAME = (480, 480, 3)
 
@@ -103,7 +102,6 @@ def test_a_window_shows_the_first_of_many_worlds(monkeypatch):
 
 
 def test_an_episode_of_one_world_can_be_filmed(tmp_path):
-    pytest.importorskip("moviepy")
     env = gym.make(PUSH, render_mode="rgb_array", max_episode_steps=8)
     env = RecordVideo(
         env, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True
@@ -117,7 +115,6 @@ def test_an_episode_of_one_world_can_be_filmed(tmp_path):
 
 
 def test_episodes_of_many_worlds_can_be_filmed(tmp_path):
-    pytest.importorskip("moviepy")
     envs = make_vec(4, render_mode="rgb_array", max_episode_steps=8)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)

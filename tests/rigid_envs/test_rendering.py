@@ -8,13 +8,12 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
+import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
 from physics.shapes import Box, Capsule, Sphere
 from rigid_envs.rendering import TO_LIGHT, Arrow, Camera, Goal, Item, Renderer, grid
-
-pygame = pytest.importorskip("pygame")
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 RED, GREEN, BLUE = (220, 40, 40), (40, 180, 60), (40, 60, 220)
