@@ -9,9 +9,10 @@ import math
 from functools import cache
 
 from physics.features import Features
-from physics.jit import SOURCES, entry, kernel
+from physics.group import load, load_forces, store
+from physics.jit import LANES, SOURCES, entry, kernel, stage
 from physics.pipeline import make_forces, make_substep
-from physics.stages.candidates import make_collision_step, make_search
+from physics.stages.candidates import make_collision_step, make_side_search
 from physics.stages.kinematics import make_kinematics, place_statics
 
 # m, kg m/s or kg m^2/s in sum: beyond it a mover counts as diverged
@@ -25,47 +26,71 @@ def cut(span: float, longest: float) -> int:
 
 @cache
 def make_refresh(features: Features):
-    """Kernel that brings candidates and forces up to a state that was set from outside."""
+    """Kernel that brings candidates and forces up to states that were set from outside.
+
+    Lanes whose state wasn't set stay as they are: no contact remembers a step of no length.
+    """
     kinematics = make_kinematics(features)
-    search = make_search(features)
+    side_search = make_side_search(features)
     forces = make_forces(features)
 
-    @kernel
-    def refresh(model, state, frame, rel, rows, old, w):
-        kinematics(model, state, frame, w)
+    @stage
+    def refresh(model, state, work, g):
+        lane = work.lane[0]
+        kinematics(model, work)
         for k in range(model.side.shape[0]):
-            state.side[w, k].count = 0  # what an earlier look left behind doesn't count
-            search(model, state, frame, rel, old, w, k)
-        forces(model, state, frame, rel, rows, w, 0.0, state.world[w].time)
-        state.world[w].stale = 0
+            for i in range(LANES):
+                if lane.stale[i]:
+                    work.side[k].travel[i] = -1.0
+            side_search(model, state, work, g, k, 0.0, False)
+        forces(model, state, work, g, 0.0, 0.0)
+        for m in range(model.mover.shape[0]):
+            for i in range(LANES):
+                if lane.active[i] and not lane.stale[i]:
+                    load_forces(state, work, g, m, i)
 
     return refresh
 
 
 @kernel
-def first_diverged(state, w):
-    """Index of the first mover of a world that isn't finite, plus 1; 0 if all are.
+def first_diverged(model, work, i):
+    """Index of the first mover in lane i that isn't finite, plus 1; 0 if all are.
 
     Forces hold squares of squares of speeds: a state that is too large for these counts as well.
     """
-    for i in range(state.mover.shape[1]):
-        m = state.mover[w, i]
+    for m in range(model.mover.shape[0]):
+        solid = work.solid[m]
         total = 0.0
         for c in range(3):
-            total += abs(m.position[c]) + abs(m.momentum[c]) + abs(m.angular_momentum[c])
+            total += abs(solid.position[c, i])
+            total += abs(solid.momentum[c, i]) + abs(solid.angular_momentum[c, i])
         if not total < LARGEST:
-            return i + 1
+            return m + 1
     return 0
+
+
+@stage
+def write_back(model, state, work, g, elapsed, last):
+    """Writes lanes back to their worlds: those that have diverged, and at the `last` call all."""
+    lane = work.lane[0]
+    for i in range(LANES):
+        if lane.active[i]:
+            diverged = first_diverged(model, work, i)
+            if last or diverged != 0:
+                store(model, state, work, g, i, lane.start[i] + elapsed)
+                state.world[g * LANES + i].stale = 0
+                state.world[g * LANES + i].diverged = diverged
+                lane.active[i] = 0
 
 
 @cache
 def make_advance(features: Features):
-    """Entry point that advances the worlds first <= w < last by substeps * h seconds.
+    """Entry point that advances the worlds of groups first <= g < last by substeps * h seconds.
 
     It returns how many of them have diverged or run out of room for candidates.
 
-    Every world runs the same instructions on its own rows alone, so its result is the same to the
-    last bit whatever runs beside it, and however worlds are shared out over threads.
+    Every world runs the same instructions in its own lane, so its result is the same to the last
+    bit whatever runs beside it, and however groups are shared out over threads.
     """
     sources = SOURCES
     refresh = make_refresh(features)
@@ -73,32 +98,32 @@ def make_advance(features: Features):
     substep = make_substep(features)
 
     @entry
-    def advance(model, state, scratch, first, last, h, substeps, collision_substeps):
+    def advance(model, state, work, first, last, h, substeps, collision_substeps):
         _ = sources
-        frame, rel, rows, old = scratch
-        place_statics(model, frame)
-        for w in range(first, last):
-            if state.world[w].diverged != 0:
-                continue
-            start = state.world[w].time
-            state.world[w].overflow = 0
-            if state.world[w].stale != 0:
-                refresh(model, state, frame, rel, rows, old, w)
+        place_statics(model, work)
+        failed = 0
+        for g in range(first, last):
+            load(model, state, work, g)
+            lane = work.lane[0]
+            stale = 0
+            for i in range(LANES):
+                if lane.active[i]:
+                    state.world[g * LANES + i].overflow = 0
+                stale += lane.stale[i]
+            if stale > 0:
+                refresh(model, state, work, g)
             done = 0
-            while done < substeps:
-                if done > 0:
-                    collision_step(model, state, frame, rel, old, w)
+            while True:
                 for _s in range(min(collision_substeps, substeps - done)):
                     done += 1
-                    substep(model, state, frame, rel, rows, old, w, h, start + done * h)
-                state.world[w].diverged = first_diverged(state, w)
-                if state.world[w].diverged != 0:
+                    substep(model, state, work, g, h, done * h)
+                write_back(model, state, work, g, done * h, done == substeps)
+                if done == substeps:
                     break
-            state.world[w].time = start + done * h
-        failed = 0
-        for w in range(first, last):
-            status = state.world[w]
-            failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
+                collision_step(model, state, work, g)
+            for w in range(g * LANES, min((g + 1) * LANES, state.world.shape[0])):
+                status = state.world[w]
+                failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
         return failed
 
     return advance

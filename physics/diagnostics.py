@@ -6,21 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.features import Features
+from physics.group import Work, load
 from physics.jit import LANES, SOURCES, entry
 from physics.model import Model
 from physics.rotation import rotation_matrix
 from physics.shapes import PLANE
-from physics.stages.contacts import (
-    REPORT,
-    REPORT_FORCE,
-    REPORT_NORMAL,
-    REPORT_OVERLAP,
-    REPORT_POINT,
-    REPORT_WEIGHT,
-    make_side,
-)
+from physics.stages.contacts import REPORT, make_side
 from physics.stages.kinematics import make_kinematics, place_statics
-from physics.state import Scratch, State
+from physics.state import State
 
 Array = np.ndarray
 
@@ -46,96 +39,119 @@ class Contacts(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Touching candidates of one world: side [n], and a row [n, REPORT] each, world frame."""
+    """Touching candidates of one world, in the world frame.
+
+    Attributes:
+        side: [n] of the model.
+        overlap: [n] m.
+        point: [n, 3] m.
+        normal: [n, 3].
+        force: [n, 3] N on the owner of the side.
+        weight: [n] of the sample.
+    """
 
     side: Array
-    rows: Array
+    overlap: Array
+    point: Array
+    normal: Array
+    force: Array
+    weight: Array
 
 
 @cache
 def _make_report(features: Features) -> Any:
-    """Entry point that evaluates every candidate of a world at its present state."""
+    """Entry point that evaluates every candidate of a group of worlds at its present state."""
     sources = SOURCES
     kinematics = make_kinematics(features)
     side = make_side(features, True)
 
     @entry
-    def report(model, state, scratch, w, side_of):
+    def report(model, state, work, rows):
         _ = sources
-        frame, rel, rows, _old = scratch
-        place_statics(model, frame)
-        kinematics(model, state, frame, w)
-        n = 0
+        place_statics(model, work)
+        load(model, state, work, 0)
+        kinematics(model, work)
         for k in range(model.side.shape[0]):
-            count = state.side[w, k].count
-            if count > 0:
-                # room for whole chunks: a padded lane writes too, and is written over
-                side(model, state, frame, rel, rows[n:], w, k, 0.0)
-                for _c in range(count):
-                    side_of[n] = k
-                    n += 1
-        return n
+            if work.side[k].slots > 0:
+                side(model, state, work, rows, 0, k, 0.0)
 
     return report
 
 
-def report(model: Model, features: Features, state: State, world: int) -> Report:
-    """What touches in a world, from the same kernels as the step, without a trace left behind."""
-    per_world = state.lanes.size // len(state.world)
-    only = slice(world, world + 1)
-    one = State(
-        mover=state.mover[only].copy(),
-        side=state.side[only].copy(),
-        world=state.world[only].copy(),
-        sample_id=state.sample_id[only].copy(),
-        lanes=state.lanes[world * per_world : (world + 1) * per_world].copy(),
+def _rows_of_group(model: Model, features: Features, state: State, group: int) -> Array:
+    """[slots] of REPORT, every slot of a group, by the kernels of the step."""
+    worlds = slice(group * LANES, (group + 1) * LANES)
+    alone = slice(group, group + 1)
+    copied = State(
+        mover=state.mover[worlds].copy(),
+        side=state.side[worlds].copy(),
+        world=state.world[worlds].copy(),
+        sample_id=state.sample_id[alone].copy(),
+        candidate=state.candidate[alone].copy(),  # contacts remember; a look leaves no trace
     )
-    room = one.sample_id.shape[1] + LANES
-    side_of, rows = np.zeros(room, dtype=np.int64), np.zeros((room, REPORT))
-    scratch = Scratch.of(model, rows)
-    count = _make_report(features)(model, one, scratch, 0, side_of)
-    touching = np.flatnonzero(rows[:count, REPORT_OVERLAP] > 0.0)
-    side_of, rows = side_of[touching], rows[touching]
+    rows = np.zeros(state.candidate.shape[1], REPORT)
+    _make_report(features)(model, copied, Work.of(model), rows)
+    return rows
 
-    # rows come in the frame of the side's surface
-    movers = len(model.mover)
-    statics = model.static
-    centers = np.concatenate([one.mover["position"][0], statics[:, :3]])
-    turns = rotation_matrix(np.concatenate([one.mover["orientation"][0], statics[:, 3:]]))
-    surface = model.side["surface"][side_of]
-    plane = model.side["kind"][side_of] == PLANE
-    assert not np.any(plane & (surface < movers))
-    turn = turns[surface]
-    for column in (REPORT_POINT, REPORT_NORMAL, REPORT_FORCE):
-        block = rows[:, column : column + 3]
-        rows[:, column : column + 3] = np.einsum("nij,nj->ni", turn, block)
-    # a plane's frame has the world's axes and lies under the owner's centre
-    rows[:, REPORT_POINT : REPORT_POINT + 3] += centers[surface]
-    rows[plane, REPORT_POINT + 2] += model.side["core"][side_of[plane], 0]
-    return Report(side_of, rows)
+
+def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Array, Array]:
+    """Side [n] and slot [n] of what touches in a world."""
+    side = np.repeat(np.arange(len(model.side)), model.side["slot_count"])
+    place = np.arange(len(side)) - model.side["first_slot"][side]
+    overlap = rows["overlap"][:, world % LANES]
+    touching = (place < state.side["count"][world, side]) & (overlap > 0.0)
+    return side[touching], np.flatnonzero(touching)
+
+
+def report(model: Model, features: Features, state: State, world: int) -> Report:
+    """What touches in a world."""
+    rows, lane = _rows_of_group(model, features, state, world // LANES), world % LANES
+    side, slot = _touching(model, state, world, rows)
+
+    # rows come in the frame of the side's surface; a plane's is the world's
+    statics, mover = model.static, state.mover[world]
+    centers = np.concatenate([mover["position"], statics[:, :3]])
+    turns = rotation_matrix(np.concatenate([mover["orientation"], statics[:, 3:]]))
+    surface = model.side["surface"][side]
+    plane = (model.side["kind"][side] == PLANE)[:, None]
+
+    def in_world(name: str) -> Array:
+        vectors = rows[name][slot, :, lane]
+        return np.where(plane, vectors, np.einsum("nij,nj->ni", turns[surface], vectors))
+
+    return Report(
+        side=side,
+        overlap=rows["overlap"][slot, lane],
+        point=in_world("point") + np.where(plane, 0.0, centers[surface]),
+        normal=in_world("normal"),
+        force=in_world("force"),
+        weight=rows["weight"][slot, lane],
+    )
 
 
 def contacts(model: Model, features: Features, state: State, world: int) -> Contacts:
     """The touching points of one world."""
-    side, rows = report(model, features, state, world)
+    told = report(model, features, state, world)
+    side = model.side[told.side]
     return Contacts(
-        pair=np.stack([model.side["owner"][side], model.side["surface"][side]], axis=-1),
-        point=rows[:, REPORT_POINT : REPORT_POINT + 3],
-        normal=rows[:, REPORT_NORMAL : REPORT_NORMAL + 3],
-        overlap=rows[:, REPORT_OVERLAP],
-        force=rows[:, REPORT_FORCE : REPORT_FORCE + 3],
-        first_touch=state.side["first_touch"][world, side],
+        pair=np.stack([side["owner"], side["surface"]], axis=-1),
+        point=told.point,
+        normal=told.normal,
+        overlap=told.overlap,
+        force=told.force,
+        first_touch=state.side["first_touch"][world, told.side],
     )
 
 
 def penetration(model: Model, features: Features, state: State) -> Array:
     """Deepest overlap of each world now, [w] m, 0 where nothing touches."""
-    return np.array(
-        [
-            report(model, features, state, w).rows[:, REPORT_OVERLAP].max(initial=0.0)
-            for w in range(len(state.world))
-        ]
-    )
+    deepest = np.zeros(len(state.world))
+    for group in range(len(state.candidate)):
+        rows = _rows_of_group(model, features, state, group)
+        for world in range(group * LANES, min((group + 1) * LANES, len(deepest))):
+            slot = _touching(model, state, world, rows)[1]
+            deepest[world] = rows["overlap"][slot, world % LANES].max(initial=0.0)
+    return deepest
 
 
 def contact_stiffness(
@@ -147,22 +163,22 @@ def contact_stiffness(
     damping is the tangential one and the servos'; that along the normal takes no more than the
     approach speed and limits no step.
     """
-    side, rows = report(model, features, state, world)
+    told = report(model, features, state, world)
     movers = len(model.mover)
     K, C = np.zeros((6 * movers, 6 * movers)), np.zeros((6 * movers, 6 * movers))
-    for k, row in zip(side, rows, strict=True):
+    for k, point, normal, weight in zip(
+        told.side, told.point, told.normal, told.weight, strict=True
+    ):
         constants = model.side[k]
-        normal = row[REPORT_NORMAL : REPORT_NORMAL + 3]
         jacobian = np.zeros((3, 6 * movers))
         for solid, sign in ((constants["owner"], 1.0), (constants["surface"], -1.0)):
             if solid < movers:
-                r = row[REPORT_POINT : REPORT_POINT + 3] - state.mover["position"][world, solid]
+                r = point - state.mover["position"][world, solid]
                 cross = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
                 jacobian[:, 6 * solid : 6 * solid + 3] = sign * np.eye(3)
                 jacobian[:, 6 * solid + 3 : 6 * solid + 6] = sign * cross
         along = np.outer(normal, normal)
         across = (np.eye(3) - along) * (constants["friction"] > 0.0)
-        weight = row[REPORT_WEIGHT]
         stiffness = constants["stiffness"] * along + constants["shear_stiffness"] * across
         K += weight * jacobian.T @ stiffness @ jacobian
         C += weight * jacobian.T @ (constants["shear_damping"] * across) @ jacobian

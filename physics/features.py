@@ -17,7 +17,6 @@ class Features(NamedTuple):
         friction: any pair has friction: tangential law and history.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
-        reaction: a surface belongs to a body or a drive, which feels the opposite force.
         drives: there are driven tools.
     """
 
@@ -29,20 +28,4 @@ class Features(NamedTuple):
     box: bool
     capsule: bool
     particles: bool
-    reaction: bool
     drives: bool
-
-    @property
-    def lane_fields(self) -> int:
-        """Numbers stored for a candidate: sample x y z, weight, impact speed, load, and more."""
-        return 6 + 3 * self.friction + 3 * self.particles
-
-    @property
-    def history_field(self) -> int:
-        """First field of the tangential history x y z."""
-        return 6
-
-    @property
-    def partner_field(self) -> int:
-        """First field of the other body's particle x y z."""
-        return 6 + 3 * self.friction

@@ -12,7 +12,6 @@ import numpy as np
 
 from physics.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.fidelity import Fidelity
-from physics.jit import LANES
 from physics.scene import NO_TURN, Body, Drive, Ground, Material, Scene, Static
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Samples, Sphere, Surface
 from physics.stages.friction import tangential_coefficients
@@ -48,8 +47,8 @@ SIDE = np.dtype(
         ("sample_count", "i8"),
         ("first_partner", "i8"),  # likewise, the particles of a particle surface
         ("partner_count", "i8"),
-        ("first_chunk", "i8"),  # room for candidates, LANES to a chunk
-        ("chunk_count", "i8"),
+        ("first_slot", "i8"),  # room for candidates
+        ("slot_count", "i8"),
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
@@ -182,7 +181,7 @@ def _mover_row(solid: Solid, gravity: Array) -> tuple[object, ...]:
     reach = solid.shape.reach
     if isinstance(solid, Body):
         inertia = solid.shape.inertia(solid.mass)
-        weight = solid.mass * gravity
+        weight = solid.mass * gravity + 0.0  # without a negative zero, which sums would lose
         return 1, reach, 1.0 / solid.mass, inertia, 1.0 / inertia, weight, 0.0, 0.0, 0.0
     stiffness = solid.mass * solid.frequency**2
     damping = 2.0 * solid.damping_ratio * solid.mass * solid.frequency
@@ -201,7 +200,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
     sides = list(_sides(scene, fidelity))
     side = np.zeros(len(sides), dtype=SIDE)
     samples: list[Array] = [np.zeros((0, 4))]
-    chunks = 0
+    slots = 0
 
     def add(some: Samples) -> tuple[int, int]:
         first = sum(len(block) for block in samples)
@@ -224,8 +223,8 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         row["first_sample"], row["sample_count"] = add(pair.samples)
         if pair.partners is not None:
             row["first_partner"], row["partner_count"] = add(pair.partners)
-        row["first_chunk"], row["chunk_count"] = chunks, -(-_capacity(pair) // LANES)
-        chunks += int(row["chunk_count"])
+        row["first_slot"], row["slot_count"] = slots, _capacity(pair)
+        slots += int(row["slot_count"])
         row["core"] = pair.surface.parameters
         row["owner_radius"] = pair.samples.radius
         row["radius"] = pair.samples.radius + pair.surface.radius
@@ -271,6 +270,5 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
         box=BOX in kinds,
         capsule=CAPSULE in kinds,
         particles=PARTICLES in kinds,
-        reaction=bool(np.any(model.side["surface"] < len(model.mover))),
         drives=bool(scene.drives),
     )

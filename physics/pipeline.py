@@ -19,17 +19,17 @@ def make_forces(features: Features):
     contacts = make_contacts(features)
 
     @stage
-    def forces(model, state, frame, rel, rows, w, h, time):
-        gravity(model, state, w)
-        drives(model, state, frame, w, h)
-        contacts(model, state, frame, rel, rows, w, h, time)
+    def forces(model, state, work, g, h, elapsed):
+        gravity(model, work)
+        drives(model, work, h)
+        contacts(model, state, work, g, h, elapsed)
 
     return forces
 
 
 @cache
 def make_substep(features: Features):
-    """One step of the simulation layer."""
+    """One step of the simulation layer, for the worlds of group g."""
     kick = make_kick(features)
     drift = make_drift(features)
     kinematics = make_kinematics(features)
@@ -37,12 +37,12 @@ def make_substep(features: Features):
     forces = make_forces(features)
 
     @stage
-    def substep(model, state, frame, rel, rows, old, w, h, time):
-        kick(model, state, w, 0.5 * h)
-        drift(model, state, frame, w, h)
-        kinematics(model, state, frame, w)
-        candidates(model, state, frame, rel, old, w)
-        forces(model, state, frame, rel, rows, w, h, time)
-        kick(model, state, w, 0.5 * h)
+    def substep(model, state, work, g, h, elapsed):
+        kick(model, work, 0.5 * h)
+        drift(model, work, h)
+        kinematics(model, work)
+        candidates(model, state, work, g)
+        forces(model, state, work, g, h, elapsed)
+        kick(model, work, 0.5 * h)
 
     return substep

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
-from physics.jit import kernel
+from physics.jit import kernel, stage
 
 Array = np.ndarray
 
 
-@kernel
+@stage
 def rotation_entries(x, y, z, w):
     """The nine entries of the rotation matrix, row by row, of a unit quaternion."""
     xx, yy, zz = x * x, y * y, z * z
@@ -34,31 +34,42 @@ def rotation_entries(x, y, z, w):
     )
 
 
-@kernel
-def turn(x, y, z, w, ax, ay, az):
-    """Quaternion after a turn by the world-frame rotation vector (ax, ay, az), in rad.
+# rad: up to here the series of `turn` is exact to round-off
+SMALL_TURN = 0.3
 
-    The exponential map exp(a/2) (x) q. Below an angle of 0.3 rad the series of sin(s)/s and cos(s)
-    to s^10 is exact to round-off and costs no trigonometry. One Newton step keeps |q| = 1.
-    """
-    s2 = 0.25 * (ax * ax + ay * ay + az * az)
-    if s2 < 0.0225:
-        sinc = 1.0 - s2 / 6.0 * (1.0 - s2 / 20.0 * (1.0 - s2 / 42.0 * (1.0 - s2 / 72.0)))
-        c = 1.0 - s2 / 2.0 * (
-            1.0 - s2 / 12.0 * (1.0 - s2 / 30.0 * (1.0 - s2 / 56.0 * (1.0 - s2 / 90.0)))
-        )
-    else:
-        s = math.sqrt(s2)
-        sinc = math.sin(s) / s
-        c = math.cos(s)
-    k = 0.5 * sinc
-    px, py, pz = k * ax, k * ay, k * az
+
+@stage
+def _composed(x, y, z, w, px, py, pz, c):
+    """The product (p, c) (x) (x, y, z, w); one Newton step brings its length back to 1."""
     nx = c * x + w * px + (py * z - pz * y)
     ny = c * y + w * py + (pz * x - px * z)
     nz = c * z + w * pz + (px * y - py * x)
     nw = c * w - (px * x + py * y + pz * z)
     n = 1.5 - 0.5 * (nx * nx + ny * ny + nz * nz + nw * nw)
     return nx * n, ny * n, nz * n, nw * n
+
+
+@stage
+def turn(x, y, z, w, ax, ay, az):
+    """Quaternion after a turn by the world-frame rotation vector (ax, ay, az), in rad.
+
+    The exponential map exp(a/2) (x) q, for angles up to SMALL_TURN: the series of sin(s)/s and
+    cos(s) to s^10 cost no branch and no trigonometry, so worlds turn side by side.
+    """
+    s2 = 0.25 * (ax * ax + ay * ay + az * az)
+    k = 0.5 - s2 * (0.5 / 6) * (1.0 - s2 * (1 / 20) * (1.0 - s2 * (1 / 42) * (1.0 - s2 * (1 / 72))))
+    c = 1.0 - s2 * (1 / 2) * (
+        1.0 - s2 * (1 / 12) * (1.0 - s2 * (1 / 30) * (1.0 - s2 * (1 / 56) * (1.0 - s2 * (1 / 90))))
+    )
+    return _composed(x, y, z, w, k * ax, k * ay, k * az, c)
+
+
+@kernel
+def turn_far(x, y, z, w, ax, ay, az):
+    """As `turn`, by an angle of any size above zero."""
+    s = 0.5 * math.sqrt(ax * ax + ay * ay + az * az)
+    k = 0.5 * math.sin(s) / s
+    return _composed(x, y, z, w, k * ax, k * ay, k * az, math.cos(s))
 
 
 def rotation_matrix(quaternion: Array) -> Array:

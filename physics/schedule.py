@@ -1,6 +1,6 @@
 """How worlds are shared out over threads.
 
-Kernels release the GIL, so plain Python threads run them side by side, and blocks of worlds go to
+Kernels release the GIL, so plain Python threads run them side by side, and blocks of groups go to
 whichever thread is free. One kernel serves one world and thousands. Unlike a runtime with threads
 of its own inside the kernel, this survives a fork (the pool is made on first use, anew in a child),
 runs under several Python threads at once, and takes any number of threads on any number of cores.
@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 from physics.validation import integer
 
-# fewer worlds than this run in the caller's thread: waking another costs tens of microseconds
-_BLOCK = 64
+# fewer groups than this run in the caller's thread: waking another costs tens of microseconds
+_BLOCK = 8
 
 _pools: dict[int, ThreadPoolExecutor] = {}
 os.register_at_fork(after_in_child=_pools.clear)
@@ -30,7 +30,7 @@ def check_threads(threads: int | None) -> int:
 
 
 def share_out(run: Callable[[int, int], int], count: int, threads: int) -> int:
-    """Sum of run(first, last) over blocks that cover the worlds 0 <= w < count, on threads."""
+    """Sum of run(first, last) over blocks that cover the groups 0 <= g < count, on threads."""
     threads = min(threads, -(-count // _BLOCK))
     if threads == 1:
         return run(0, count)

@@ -1,5 +1,6 @@
 """State: what changes, as arrays with a leading world axis."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -7,13 +8,8 @@ import numpy as np
 from physics.features import Features
 from physics.jit import LANES
 from physics.model import Model
-from physics.stages.candidates import OLD
-from physics.stages.contacts import REPORT
-from physics.stages.kinematics import FRAME
-from physics.stages.relative import RELATIVE
 
 Array = np.ndarray
-
 
 # one row a mover and world: bodies, then drives
 MOVING = np.dtype(
@@ -52,6 +48,23 @@ STATUS = np.dtype(
 )
 
 
+@cache
+def candidate_dtype(features: Features) -> np.dtype:
+    """One row a slot: a candidate in each lane of a group, zeros where there is none."""
+    fields = [
+        ("sample", "f8", (3, LANES)),  # m, in the owner's frame
+        ("weight", "f8", (LANES,)),
+        # what a contact remembers
+        ("impact_speed", "f8", (LANES,)),  # m/s, negative while separating, 0 while apart
+        ("load", "f8", (LANES,)),  # N, what pressed it in the last step
+    ]
+    if features.friction:
+        fields.append(("shear", "f8", (3, LANES)))  # m
+    if features.particles:
+        fields.append(("partner", "f8", (3, LANES)))  # m, particle of the surface
+    return np.dtype(fields, align=True)
+
+
 class State(NamedTuple):
     """What changes.
 
@@ -59,15 +72,15 @@ class State(NamedTuple):
         mover: [w, m] of MOVING.
         side: [w, k] of FOUND.
         world: [w] of STATUS.
-        sample_id: [w, lanes] of each candidate.
-        lanes: [w * chunks * fields * LANES] what is stored of each candidate, chunk by chunk.
+        sample_id: [groups, slots, LANES] of each candidate; LANES worlds make a group.
+        candidate: [groups, slots] of candidate_dtype.
     """
 
     mover: Array
     side: Array
     world: Array
     sample_id: Array
-    lanes: Array
+    candidate: Array
 
     @property
     def nbytes(self) -> int:
@@ -75,15 +88,25 @@ class State(NamedTuple):
         return sum(array.nbytes for array in self)
 
 
+def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
+    """Zeros that begin at a cache line, as vectors of LANES doubles should."""
+    line = 64
+    size = int(np.prod(shape)) * dtype.itemsize
+    room = np.zeros(size + line, dtype=np.uint8)
+    first = -room.ctypes.data % line
+    return room[first : first + size].view(dtype).reshape(shape)
+
+
 def allocate(model: Model, features: Features, count: int) -> State:
     """State arrays of `count` worlds, at rest at the origin and stale."""
-    chunks = int(model.side["chunk_count"].sum())
+    slots = int(model.side["slot_count"].sum())
+    groups = -(-count // LANES)
     state = State(
         mover=np.zeros((count, len(model.mover)), dtype=MOVING),
         side=np.zeros((count, len(model.side)), dtype=FOUND),
         world=np.zeros(count, dtype=STATUS),
-        sample_id=np.zeros((count, chunks * LANES), dtype=np.int32),
-        lanes=np.zeros(count * chunks * features.lane_fields * LANES),
+        sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
+        candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
     )
     state.mover["orientation"][..., 3] = 1.0
     state.side["travel"] = -1.0
@@ -95,30 +118,3 @@ def allocate(model: Model, features: Features, count: int) -> State:
 def copy(state: State) -> State:
     """A deep copy."""
     return State(*(array.copy() for array in state))
-
-
-class Scratch(NamedTuple):
-    """Working arrays of one call of a kernel, shared by no two threads.
-
-    Attributes:
-        frame: [solids, FRAME].
-        rel: [RELATIVE].
-        rows: [rows, REPORT] of a report; none otherwise.
-        old: [lanes, OLD] of the longest list of candidates.
-    """
-
-    frame: Array
-    rel: Array
-    rows: Array
-    old: Array
-
-    @classmethod
-    def of(cls, model: Model, rows: Array | None = None) -> "Scratch":
-        """Scratch arrays for a model."""
-        longest = int(model.side["chunk_count"].max(initial=0)) * LANES
-        return cls(
-            frame=np.zeros((len(model.mover) + len(model.static), FRAME)),
-            rel=np.zeros(RELATIVE),
-            rows=np.zeros((0, REPORT)) if rows is None else rows,
-            old=np.zeros((longest, OLD)),
-        )

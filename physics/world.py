@@ -10,12 +10,14 @@ from physics.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged
 from physics.features import ISOTROPIC, NO_ROTATION, Features
 from physics.fidelity import Fidelity, resolve
+from physics.group import Work
+from physics.jit import LANES
 from physics.model import Model, build
 from physics.readout import WIDTH, Readout, make_readout
 from physics.rotation import rotate, rotate_back
 from physics.scene import Body, Drive, Scene
 from physics.schedule import check_threads, share_out
-from physics.state import Scratch, State, allocate
+from physics.state import State, allocate
 from physics.state import copy as copy_state
 from physics.validation import array, instance, integer, positive
 
@@ -63,7 +65,7 @@ class World:
         self._model, self._features = build(scene, self.fidelity)
         self._check_step(allow_unstable)
         self._find_kernels()
-        self._scratch = Scratch.of(self._model)
+        self._idle: list[Work] = []
         self._state = allocate(self._model, self._features, self.count)
         self._reset(np.ones(self.count, dtype=bool))
 
@@ -126,7 +128,6 @@ class World:
         state = self._state
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
-        state.side["count"][worlds] = 0
         state.side["first_touch"][worlds] = np.nan
         state.world["overflow"][worlds] = 0
 
@@ -146,13 +147,16 @@ class World:
 
     def _run(self, h: float, substeps: int) -> None:
         kernel = self._advance
-        model, state, group = self._model, self._state, self.fidelity.collision_substeps
+        model, state, together = self._model, self._state, self.fidelity.collision_substeps
+        groups, idle = -(-self.count // LANES), self._idle
 
         def run(first: int, last: int) -> int:
-            scratch = self._scratch if self.count == last - first else Scratch.of(model)
-            return int(kernel(model, state, scratch, first, last, h, substeps, group))
+            work = idle.pop() if idle else Work.of(model)
+            failed = int(kernel(model, state, work, first, last, h, substeps, together))
+            idle.append(work)
+            return failed
 
-        if share_out(run, self.count, self.threads) == 0:
+        if share_out(run, groups, self.threads) == 0:
             return
         if state.world["diverged"].any():
             self._raise_diverged(h)

@@ -2,15 +2,7 @@
 
 from functools import cache
 
-from physics.jit import kernel, stage
-from physics.stages.kinematics import CENTER, VELOCITY
-
-
-@kernel
-def servo_force(constants, ahead, faster):
-    """Force in N along an axis; the reference is `ahead` by m and `faster` by m/s."""
-    pull = constants.servo_stiffness * ahead + constants.servo_damping * faster
-    return min(max(pull, -constants.force_limit), constants.force_limit)
+from physics.jit import LANES, stage
 
 
 @cache
@@ -19,28 +11,22 @@ def make_drives(features):
     present = features.drives
 
     @stage
-    def drives(model, state, frame, w, h):
+    def drives(model, work, h):
         if present:
-            for i in range(model.mover.shape[0]):
-                m, constants = state.mover[w, i], model.mover[i]
-                if constants.turns:
+            for m in range(model.mover.shape[0]):
+                if model.mover[m].turns:
                     continue
-                # axis by axis and not in a loop: three turns would become a masked vector store,
-                # which the next load has to wait for
-                vx, vy, vz = (
-                    m.reference_velocity[0],
-                    m.reference_velocity[1],
-                    m.reference_velocity[2],
-                )
-                x = m.reference[0] + h * vx
-                y = m.reference[1] + h * vy
-                z = m.reference[2] + h * vz
-                m.reference[0] = x
-                m.reference[1] = y
-                m.reference[2] = z
-                ux, uy, uz = frame[i, VELOCITY], frame[i, VELOCITY + 1], frame[i, VELOCITY + 2]
-                m.force[0] += servo_force(constants, x - frame[i, CENTER], vx - ux)
-                m.force[1] += servo_force(constants, y - frame[i, CENTER + 1], vy - uy)
-                m.force[2] += servo_force(constants, z - frame[i, CENTER + 2], vz - uz)
+                solid, constants = work.solid[m], model.mover[m]
+                c, v, force = solid.position, solid.velocity, solid.force
+                reference, wanted = solid.reference, solid.reference_velocity
+                stiffness, damping = constants.servo_stiffness, constants.servo_damping
+                limit = constants.force_limit
+                for axis in range(3):
+                    for i in range(LANES):
+                        ahead = reference[axis, i] + h * wanted[axis, i]
+                        reference[axis, i] = ahead
+                        pull = stiffness * (ahead - c[axis, i])
+                        pull += damping * (wanted[axis, i] - v[axis, i])
+                        force[axis, i] += min(max(pull, -limit), limit)
 
     return drives

@@ -14,7 +14,7 @@ leaves an error of length, at most about half the sink for a cube, whatever the 
 
 import math
 
-from physics.jit import lane_inlined
+from physics.jit import stage
 
 
 def tangential_coefficients(
@@ -33,7 +33,7 @@ def tangential_coefficients(
     return shear_stiffness, math.sqrt(2.0 * shear_stiffness * pair_mass)
 
 
-@lane_inlined
+@stage
 def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz):
     """Tangential force x y z [N] of a sample with the whole pair's stiffness, and its new shear.
 

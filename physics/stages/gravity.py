@@ -1,16 +1,18 @@
 """Gravity: a uniform field makes no torque. It comes first and so clears the last step's sums."""
 
-from physics.jit import stage
+from physics.jit import LANES, stage
 
 
 @stage
-def gravity(model, state, w):
+def gravity(model, work):
     """Sets every mover's force to its weight and its torque to zero."""
-    for i in range(model.mover.shape[0]):
-        m = state.mover[w, i]
-        m.force[0] = model.mover[i].weight[0]
-        m.torque[0] = 0.0
-        m.force[1] = model.mover[i].weight[1]
-        m.torque[1] = 0.0
-        m.force[2] = model.mover[i].weight[2]
-        m.torque[2] = 0.0
+    for m in range(model.mover.shape[0]):
+        force, torque, weight = work.solid[m].force, work.solid[m].torque, model.mover[m].weight
+        wx, wy, wz = weight[0], weight[1], weight[2]
+        for i in range(LANES):
+            force[0, i] = wx
+            force[1, i] = wy
+            force[2, i] = wz
+            torque[0, i] = 0.0
+            torque[1, i] = 0.0
+            torque[2, i] = 0.0

@@ -9,9 +9,9 @@ ahead.
 from functools import cache
 
 from physics.features import GENERAL, NO_ROTATION
-from physics.jit import stage
-from physics.rotation import turn
-from physics.stages.kinematics import PATH, spin_of
+from physics.jit import LANES, stage
+from physics.rotation import SMALL_TURN, turn, turn_far
+from physics.stages.kinematics import spin_of
 
 
 @cache
@@ -20,59 +20,102 @@ def make_kick(features):
     rotation = features.rotation
 
     @stage
-    def kick(model, state, w, time):
-        for i in range(model.mover.shape[0]):
-            m = state.mover[w, i]
-            m.momentum[0] += time * m.force[0]
-            m.momentum[1] += time * m.force[1]
-            m.momentum[2] += time * m.force[2]
-            if rotation != NO_ROTATION and model.mover[i].turns:
-                m.angular_momentum[0] += time * m.torque[0]
-                m.angular_momentum[1] += time * m.torque[1]
-                m.angular_momentum[2] += time * m.torque[2]
+    def kick(model, work, time):
+        for m in range(model.mover.shape[0]):
+            solid = work.solid[m]
+            P, force, L, torque = (
+                solid.momentum,
+                solid.force,
+                solid.angular_momentum,
+                solid.torque,
+            )
+            for i in range(LANES):
+                P[0, i] += time * force[0, i]
+                P[1, i] += time * force[1, i]
+                P[2, i] += time * force[2, i]
+            if rotation != NO_ROTATION and model.mover[m].turns:
+                for i in range(LANES):
+                    L[0, i] += time * torque[0, i]
+                    L[1, i] += time * torque[1, i]
+                    L[2, i] += time * torque[2, i]
 
     return kick
+
+
+@cache
+def make_turning(features, turn):
+    """Formula that turns a quaternion by the midpoint rule, and tells omega."""
+    rotation = features.rotation
+
+    @stage
+    def turning(x, y, z, w, jx, jy, jz, lx, ly, lz, time):
+        if rotation == GENERAL:
+            half = 0.5 * time
+            ox, oy, oz = spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
+            hx, hy, hz, hw = turn(x, y, z, w, half * ox, half * oy, half * oz)
+            ox, oy, oz = spin_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
+        else:
+            ox, oy, oz = jx * lx, jx * ly, jx * lz
+        x, y, z, w = turn(x, y, z, w, time * ox, time * oy, time * oz)
+        return x, y, z, w, ox, oy, oz
+
+    return turning
 
 
 @cache
 def make_drift(features):
     """Stage that moves and turns every mover for a time, and tells how far its surface may go."""
     rotation = features.rotation
+    turning, turning_far = make_turning(features, turn), make_turning(features, turn_far)
 
     @stage
-    def drift(model, state, frame, w, time):
-        for i in range(model.mover.shape[0]):
-            m = state.mover[w, i]
-            constants = model.mover[i]
-            # the sum of absolute values is never less than the length, and needs no root
-            path = 0.0
-            step = time * constants.inverse_mass * m.momentum[0]
-            m.position[0] += step
-            path += abs(step)
-            step = time * constants.inverse_mass * m.momentum[1]
-            m.position[1] += step
-            path += abs(step)
-            step = time * constants.inverse_mass * m.momentum[2]
-            m.position[2] += step
-            path += abs(step)
-            if rotation != NO_ROTATION and constants.turns:
-                q, L, j = m.orientation, m.angular_momentum, constants.inverse_inertia
-                x, y, z, s = q[0], q[1], q[2], q[3]
-                lx, ly, lz = L[0], L[1], L[2]
-                jx, jy, jz = j[0], j[1], j[2]
-                if rotation == GENERAL:
-                    ox, oy, oz = spin_of(x, y, z, s, jx, jy, jz, lx, ly, lz)
-                    half = 0.5 * time
-                    hx, hy, hz, hs = turn(x, y, z, s, half * ox, half * oy, half * oz)
-                    ox, oy, oz = spin_of(hx, hy, hz, hs, jx, jy, jz, lx, ly, lz)
-                else:
-                    ox, oy, oz = jx * lx, jx * ly, jx * lz
-                x, y, z, s = turn(x, y, z, s, time * ox, time * oy, time * oz)
-                q[0] = x
-                q[1] = y
-                q[2] = z
-                q[3] = s
-                path += constants.reach * time * (abs(ox) + abs(oy) + abs(oz))
-            frame[i, PATH] = path
+    def drift(model, work, time):
+        for m in range(model.mover.shape[0]):
+            solid, constants = work.solid[m], model.mover[m]
+            c, q, P, L, path = (
+                solid.position,
+                solid.orientation,
+                solid.momentum,
+                solid.angular_momentum,
+                solid.path,
+            )
+            step, reach = time * constants.inverse_mass, time * constants.reach
+            j = constants.inverse_inertia
+            jx, jy, jz = j[0], j[1], j[2]
+            for i in range(LANES):
+                dx, dy, dz = step * P[0, i], step * P[1, i], step * P[2, i]
+                c[0, i] += dx
+                c[1, i] += dy
+                c[2, i] += dz
+                # the sum of absolute values is never less than the length, and needs no root
+                path[i] = abs(dx) + abs(dy) + abs(dz)
+            if rotation == NO_ROTATION or not constants.turns:
+                continue
+            fastest = time * max(jx, jy, jz)
+            square = SMALL_TURN * SMALL_TURN / (fastest * fastest)
+            far = 0
+            for i in range(LANES):
+                x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
+                lx, ly, lz = L[0, i], L[1, i], L[2, i]
+                nx, ny, nz, nw, ox, oy, oz = turning(x, y, z, w, jx, jy, jz, lx, ly, lz, time)
+                near = lx * lx + ly * ly + lz * lz <= square
+                q[0, i] = nx if near else x
+                q[1, i] = ny if near else y
+                q[2, i] = nz if near else z
+                q[3, i] = nw if near else w
+                path[i] += reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
+                far += 0 if near else 1
+            if far > 0:
+                for i in range(LANES):
+                    lx, ly, lz = L[0, i], L[1, i], L[2, i]
+                    if not lx * lx + ly * ly + lz * lz <= square:
+                        x, y, z, w, ox, oy, oz = turning_far(
+                            q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz, time
+                        )
+                        q[0, i] = x
+                        q[1, i] = y
+                        q[2, i] = z
+                        q[3, i] = w
+                        path[i] += reach * (abs(ox) + abs(oy) + abs(oz))
 
     return drift

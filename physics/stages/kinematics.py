@@ -1,68 +1,68 @@
-"""Frames of all solids: rotation matrix, position, velocity and angular velocity.
-
-One row a solid of a scratch array [solids, FRAME]: columns 0-8 the rotation matrix, then c, v and
-omega in the world frame, and how far a surface point has moved at most in the last drift.
-"""
+"""Frames of all solids: rotation matrix, velocity and angular velocity from the state."""
 
 from functools import cache
 
 from physics.features import GENERAL, NO_ROTATION
-from physics.jit import kernel, stage
+from physics.jit import LANES, stage
 from physics.rotation import rotation_entries
 
-CENTER, VELOCITY, SPIN, PATH, FRAME = 9, 12, 15, 18, 19
+
+@stage
+def place(solid, i):
+    """Writes the rotation matrix of a solid in lane i from its quaternion."""
+    q, R = solid.orientation, solid.rotation
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(
+        q[0, i], q[1, i], q[2, i], q[3, i]
+    )
+    R[0, i] = r00
+    R[1, i] = r01
+    R[2, i] = r02
+    R[3, i] = r10
+    R[4, i] = r11
+    R[5, i] = r12
+    R[6, i] = r20
+    R[7, i] = r21
+    R[8, i] = r22
 
 
-@kernel
-def place(frame, i, qx, qy, qz, qw, x, y, z):
-    """Writes a solid's pose."""
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(qx, qy, qz, qw)
-    frame[i, 0] = r00
-    frame[i, 1] = r01
-    frame[i, 2] = r02
-    frame[i, 3] = r10
-    frame[i, 4] = r11
-    frame[i, 5] = r12
-    frame[i, 6] = r20
-    frame[i, 7] = r21
-    frame[i, 8] = r22
-    frame[i, CENTER] = x
-    frame[i, CENTER + 1] = y
-    frame[i, CENTER + 2] = z
-
-
-@kernel
-def place_statics(model, frame):
+@stage
+def place_statics(model, work):
     """Writes the rows of the statics, once for all worlds and steps."""
     movers = model.mover.shape[0]
     for s in range(model.static.shape[0]):
-        p = model.static
-        place(frame, movers + s, p[s, 3], p[s, 4], p[s, 5], p[s, 6], p[s, 0], p[s, 1], p[s, 2])
-        for c in range(VELOCITY, FRAME):
-            frame[movers + s, c] = 0.0
+        solid = work.solid[movers + s]
+        for i in range(LANES):
+            for c in range(3):
+                solid.position[c, i] = model.static[s, c]
+                solid.velocity[c, i] = 0.0
+                solid.spin[c, i] = 0.0
+            for c in range(4):
+                solid.orientation[c, i] = model.static[s, 3 + c]
+            solid.path[i] = 0.0
+            place(solid, i)
 
 
 @stage
-def turned(frame, i, x, y, z):
-    """A vector of solid i's own frame in the world frame."""
+def turned(R, i, x, y, z):
+    """A vector of the frame R of lane i in the world frame."""
     return (
-        frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z,
-        frame[i, 3] * x + frame[i, 4] * y + frame[i, 5] * z,
-        frame[i, 6] * x + frame[i, 7] * y + frame[i, 8] * z,
+        R[0, i] * x + R[1, i] * y + R[2, i] * z,
+        R[3, i] * x + R[4, i] * y + R[5, i] * z,
+        R[6, i] * x + R[7, i] * y + R[8, i] * z,
     )
 
 
 @stage
-def turned_back(frame, i, x, y, z):
-    """A vector of the world frame in solid i's own."""
+def turned_back(R, i, x, y, z):
+    """A vector of the world frame in the frame R of lane i."""
     return (
-        frame[i, 0] * x + frame[i, 3] * y + frame[i, 6] * z,
-        frame[i, 1] * x + frame[i, 4] * y + frame[i, 7] * z,
-        frame[i, 2] * x + frame[i, 5] * y + frame[i, 8] * z,
+        R[0, i] * x + R[3, i] * y + R[6, i] * z,
+        R[1, i] * x + R[4, i] * y + R[7, i] * z,
+        R[2, i] * x + R[5, i] * y + R[8, i] * z,
     )
 
 
-@kernel
+@stage
 def spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
     """Omega = R J0^-1 R^T L of a body with quaternion x y z w; jx, jy, jz are 1/moments."""
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(x, y, z, w)
@@ -78,32 +78,34 @@ def spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
 
 @cache
 def make_kinematics(features):
-    """Stage that writes the rows of the movers of one world."""
+    """Stage that brings the frames of the movers up to their state."""
     rotation = features.rotation
 
     @stage
-    def kinematics(model, state, frame, w):
-        for i in range(model.mover.shape[0]):
-            m, constants = state.mover[w, i], model.mover[i]
-            x, y = m.orientation[0], m.orientation[1]
-            z, s = m.orientation[2], m.orientation[3]
-            place(frame, i, x, y, z, s, m.position[0], m.position[1], m.position[2])
-            frame[i, VELOCITY] = constants.inverse_mass * m.momentum[0]
-            frame[i, VELOCITY + 1] = constants.inverse_mass * m.momentum[1]
-            frame[i, VELOCITY + 2] = constants.inverse_mass * m.momentum[2]
-            ox = 0.0
-            oy = 0.0
-            oz = 0.0
-            if rotation != NO_ROTATION and constants.turns:
-                L, j = m.angular_momentum, constants.inverse_inertia
-                lx, ly, lz = L[0], L[1], L[2]
-                jx = j[0]
-                if rotation == GENERAL:
-                    ox, oy, oz = spin_of(x, y, z, s, jx, j[1], j[2], lx, ly, lz)
+    def kinematics(model, work):
+        for m in range(model.mover.shape[0]):
+            solid, constants = work.solid[m], model.mover[m]
+            q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
+            v, omega = solid.velocity, solid.spin
+            inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
+            jx, jy, jz = j[0], j[1], j[2]
+            for i in range(LANES):
+                v[0, i] = inverse_mass * P[0, i]
+                v[1, i] = inverse_mass * P[1, i]
+                v[2, i] = inverse_mass * P[2, i]
+            if not constants.turns:
+                continue
+            for i in range(LANES):
+                place(solid, i)
+                lx, ly, lz = L[0, i], L[1, i], L[2, i]
+                if rotation == NO_ROTATION:
+                    ox, oy, oz = 0.0, 0.0, 0.0
+                elif rotation == GENERAL:
+                    ox, oy, oz = spin_of(q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz)
                 else:
                     ox, oy, oz = jx * lx, jx * ly, jx * lz
-            frame[i, SPIN] = ox
-            frame[i, SPIN + 1] = oy
-            frame[i, SPIN + 2] = oz
+                omega[0, i] = ox
+                omega[1, i] = oy
+                omega[2, i] = oz
 
     return kinematics

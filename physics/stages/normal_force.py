@@ -28,7 +28,7 @@ zeta = -ln e / sqrt(pi^2 + ln^2 e) gives too high an e; the formula here is for 
 
 import math
 
-from physics.jit import lane_inlined
+from physics.jit import stage
 
 # below this restitution the approach ends within the step's resolution anyway
 _LEAST_RESTITUTION = 5e-4
@@ -89,7 +89,7 @@ def rest_speed(damping: float, gravity: float, omega: float) -> float:
     return max(damping * gravity / omega, 1e-9)
 
 
-@lane_inlined
+@stage
 def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, memory, load):
     """Normal force [N] of a sample that carries the whole pair's stiffness, and its new memories.
 
@@ -131,7 +131,7 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     return force, memory, force - mass_rate * approach
 
 
-@lane_inlined
+@stage
 def dashpot_force(overlap, approach, k, zeta, floor, inverse_mass, h, mass_rate, memory, load):
     """As `overlap_force`, by the clamped linear dashpot; damping is exact over a step."""
     rate = 2.0 * zeta * math.sqrt(k * inverse_mass)

@@ -6,10 +6,10 @@ take, and returns (distance m, normal x y z).
 
 import math
 
-from physics.jit import lane_inlined
+from physics.jit import stage
 
 
-@lane_inlined
+@stage
 def sphere_distance(x, y, z, a, b, c):
     """From a sphere's centre; at the very centre the normal is z."""
     d2 = x * x + y * y + z * z
@@ -18,7 +18,7 @@ def sphere_distance(x, y, z, a, b, c):
     return d, x * inverse, y * inverse, z * inverse if d > 1e-150 else 1.0
 
 
-@lane_inlined
+@stage
 def capsule_distance(x, y, z, a, b, half_length):
     """From the segment |z| <= half_length of the z axis; on it the normal is x."""
     z = z - min(max(z, -half_length), half_length)
@@ -27,7 +27,7 @@ def capsule_distance(x, y, z, a, b, half_length):
     return d, x * inverse if d > 1e-150 else 1.0, y * inverse, z * inverse
 
 
-@lane_inlined
+@stage
 def box_distance(x, y, z, a, b, c):
     """From a box of half extents a, b, c; negative inside, where the nearest face decides."""
     qx = abs(x) - a

@@ -44,12 +44,14 @@ def test_the_printed_matrix_of_the_lesson_takes_a_body_frame_spin():
     assert np.abs(by_world - rate).max() > 1.0
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 0.2999999, 0.3000001, 1.0, 3.1, 20.0])
-def test_a_turn_is_the_exponential_map_in_the_world_frame(angle):
+@pytest.mark.parametrize(
+    ("turn", "angle"),
+    [(rotation.turn, angle) for angle in (0.0, 1e-12, 1e-3, 0.2999999)]
+    + [(rotation.turn_far, angle) for angle in (1e-12, 0.3000001, 1.0, 3.1, 20.0)],
+)
+def test_a_turn_is_the_exponential_map_in_the_world_frame(turn, angle):
     axes = SPINS / np.linalg.norm(SPINS, axis=-1, keepdims=True)
-    turned = np.array(
-        [rotation.turn(*q, *a) for q, a in zip(QUATERNIONS, angle * axes, strict=True)]
-    )
+    turned = np.array([turn(*q, *a) for q, a in zip(QUATERNIONS, angle * axes, strict=True)])
     expected = (Rotation.from_rotvec(angle * axes) * Rotation.from_quat(QUATERNIONS)).as_quat()
     sign = np.sign(np.sum(turned * expected, axis=-1, keepdims=True))
     np.testing.assert_allclose(turned, sign * expected, atol=4e-15)
