@@ -12,6 +12,7 @@ from physics.features import Features
 from physics.group import load, load_forces, store
 from physics.jit import LANES, SOURCES, entry, kernel, stage
 from physics.pipeline import make_forces, make_substep
+from physics.readout import make_write_rows
 from physics.stages.candidates import make_collision_step, make_side_search
 from physics.stages.kinematics import make_kinematics, place_statics
 
@@ -69,25 +70,33 @@ def first_diverged(model, work, i):
     return 0
 
 
-@stage
-def write_back(model, state, work, g, elapsed, last):
-    """Writes lanes back to their worlds: those that have diverged, and at the `last` call all."""
-    lane = work.lane[0]
-    for i in range(LANES):
-        if lane.active[i]:
-            diverged = first_diverged(model, work, i)
-            if last or diverged != 0:
-                store(model, state, work, g, i, lane.start[i] + elapsed)
-                state.world[g * LANES + i].stale = 0
-                state.world[g * LANES + i].diverged = diverged
-                lane.active[i] = 0
+@cache
+def make_write_back(features: Features):
+    """Stage that writes lanes back to their worlds: the diverged ones, and in the end all."""
+    write_rows = make_write_rows(features)
+
+    @stage
+    def write_back(model, state, work, rows, g, elapsed, last):
+        lane = work.lane[0]
+        for i in range(LANES):
+            if lane.active[i]:
+                diverged = first_diverged(model, work, i)
+                if last or diverged != 0:
+                    w = g * LANES + i
+                    store(model, state, work, g, i, lane.start[i] + elapsed)
+                    write_rows(model, state, w, rows)
+                    state.world[w].stale = 0
+                    state.world[w].diverged = diverged
+                    lane.active[i] = 0
+
+    return write_back
 
 
 @cache
 def make_advance(features: Features):
     """Entry point that advances the worlds of groups first <= g < last by substeps * h seconds.
 
-    It returns how many of them have diverged or run out of room for candidates.
+    It writes their rows of a readout, and returns how many of them have diverged or run out of room for candidates.
 
     Every world runs the same instructions in its own lane, so its result is the same to the last
     bit whatever runs beside it, and however groups are shared out over threads.
@@ -96,9 +105,10 @@ def make_advance(features: Features):
     refresh = make_refresh(features)
     collision_step = make_collision_step(features)
     substep = make_substep(features)
+    write_back = make_write_back(features)
 
     @entry
-    def advance(model, state, work, first, last, h, substeps, collision_substeps):
+    def advance(model, state, work, rows, first, last, h, substeps, collision_substeps):
         _ = sources
         place_statics(model, work)
         failed = 0
@@ -117,7 +127,7 @@ def make_advance(features: Features):
                 for _s in range(min(collision_substeps, substeps - done)):
                     done += 1
                     substep(model, state, work, g, h, done * h)
-                write_back(model, state, work, g, done * h, done == substeps)
+                write_back(model, state, work, rows, g, done * h, done == substeps)
                 if done == substeps:
                     break
                 collision_step(model, state, work, g)

@@ -1,4 +1,4 @@
-"""Poses and velocities of all movers in one pass: what tasks look at after every frame."""
+"""Poses and velocities of all movers: what tasks look at after every frame."""
 
 from functools import cache
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.features import GENERAL, NO_ROTATION, Features
-from physics.jit import SOURCES, entry
+from physics.jit import SOURCES, entry, kernel
 from physics.stages.kinematics import spin_of
 
 Array = np.ndarray
@@ -46,42 +46,54 @@ class Readout(NamedTuple):
 
 
 @cache
+def make_write_rows(features: Features):
+    """Kernel that writes the rows of one world."""
+    rotation = features.rotation
+
+    @kernel
+    def write_rows(model, state, w, rows):
+        for i in range(rows.shape[1]):
+            m, constants = state.mover[w, i], model.mover[i]
+            rows[w, i, 0] = m.position[0]
+            rows[w, i, 1] = m.position[1]
+            rows[w, i, 2] = m.position[2]
+            x, y = m.orientation[0], m.orientation[1]
+            z, s = m.orientation[2], m.orientation[3]
+            # q and -q are the same rotation
+            sign = -1.0 if s < 0.0 else 1.0
+            rows[w, i, 3] = sign * x
+            rows[w, i, 4] = sign * y
+            rows[w, i, 5] = sign * z
+            rows[w, i, 6] = sign * s
+            rows[w, i, 7] = constants.inverse_mass * m.momentum[0]
+            rows[w, i, 8] = constants.inverse_mass * m.momentum[1]
+            rows[w, i, 9] = constants.inverse_mass * m.momentum[2]
+            ox = 0.0
+            oy = 0.0
+            oz = 0.0
+            if rotation != NO_ROTATION and constants.turns:
+                L, j = m.angular_momentum, constants.inverse_inertia
+                if rotation == GENERAL:
+                    ox, oy, oz = spin_of(x, y, z, s, j[0], j[1], j[2], L[0], L[1], L[2])
+                else:
+                    ox, oy, oz = j[0] * L[0], j[0] * L[1], j[0] * L[2]
+            rows[w, i, 10] = ox
+            rows[w, i, 11] = oy
+            rows[w, i, 12] = oz
+
+    return write_rows
+
+
+@cache
 def make_readout(features: Features) -> Any:
     """Entry point that writes the rows of all worlds."""
     sources = SOURCES
-    rotation = features.rotation
+    write_rows = make_write_rows(features)
 
     @entry
     def readout(model, state, rows):
         _ = sources
         for w in range(rows.shape[0]):
-            for i in range(rows.shape[1]):
-                m, constants = state.mover[w, i], model.mover[i]
-                rows[w, i, 0] = m.position[0]
-                rows[w, i, 1] = m.position[1]
-                rows[w, i, 2] = m.position[2]
-                x, y = m.orientation[0], m.orientation[1]
-                z, s = m.orientation[2], m.orientation[3]
-                # q and -q are the same rotation
-                sign = -1.0 if s < 0.0 else 1.0
-                rows[w, i, 3] = sign * x
-                rows[w, i, 4] = sign * y
-                rows[w, i, 5] = sign * z
-                rows[w, i, 6] = sign * s
-                rows[w, i, 7] = constants.inverse_mass * m.momentum[0]
-                rows[w, i, 8] = constants.inverse_mass * m.momentum[1]
-                rows[w, i, 9] = constants.inverse_mass * m.momentum[2]
-                ox = 0.0
-                oy = 0.0
-                oz = 0.0
-                if rotation != NO_ROTATION and constants.turns:
-                    L, j = m.angular_momentum, constants.inverse_inertia
-                    if rotation == GENERAL:
-                        ox, oy, oz = spin_of(x, y, z, s, j[0], j[1], j[2], L[0], L[1], L[2])
-                    else:
-                        ox, oy, oz = j[0] * L[0], j[0] * L[1], j[0] * L[2]
-                rows[w, i, 10] = ox
-                rows[w, i, 11] = oy
-                rows[w, i, 12] = oz
+            write_rows(model, state, w, rows)
 
     return readout

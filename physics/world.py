@@ -17,7 +17,7 @@ from physics.readout import WIDTH, Readout, make_readout
 from physics.rotation import rotate, rotate_back
 from physics.scene import Body, Drive, Scene
 from physics.schedule import check_threads, share_out
-from physics.state import State, allocate
+from physics.state import MOVING, State, allocate
 from physics.state import copy as copy_state
 from physics.validation import array, instance, integer, positive
 
@@ -66,7 +66,9 @@ class World:
         self._check_step(allow_unstable)
         self._find_kernels()
         self._idle: list[Work] = []
+        self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
         self._state = allocate(self._model, self._features, self.count)
+        self._initial = self._initial_rows()
         self._reset(np.ones(self.count, dtype=bool))
 
     def __repr__(self) -> str:
@@ -91,26 +93,25 @@ class World:
                 "allow_unstable=True"
             )
 
-    def _reset(self, worlds: Array) -> None:
-        """Puts the chosen worlds into the scene's state, at time zero."""
-        bodies, drives = self.scene.bodies, self.scene.drives
-        state = self._state
-        movers: list[Body | Drive] = [*bodies, *drives]
-        state.mover["position"][worlds] = [m.position for m in movers]
-        state.mover["orientation"][worlds] = [m.orientation for m in movers]
-        state.mover["momentum"][worlds] = 0.0
-        state.mover["angular_momentum"][worlds] = 0.0
+    def _initial_rows(self) -> Array:
+        """The scene's state as rows [movers] of MOVING."""
+        bodies = self.scene.bodies
+        movers: list[Body | Drive] = [*bodies, *self.scene.drives]
+        rows = np.zeros(len(movers), dtype=MOVING)
+        rows["position"] = rows["reference"] = [m.position for m in movers]
+        rows["orientation"] = [m.orientation for m in movers]
         if bodies:
             velocity = np.array([b.linear_velocity for b in bodies])
             spin = np.array([b.angular_velocity for b in bodies])
-            state.mover["momentum"][worlds, : self._bodies] = velocity / self._inverse_mass[:, None]
             turn = np.array([b.orientation for b in bodies])
-            state.mover["angular_momentum"][worlds, : self._bodies] = self._spin_momentum(
-                turn, spin
-            )
-        state.mover["reference"][worlds] = state.mover["position"][worlds]
-        state.mover["reference_velocity"][worlds] = 0.0
-        state.world["time"][worlds] = 0.0
+            rows["momentum"][: len(bodies)] = velocity / self._inverse_mass[:, None]
+            rows["angular_momentum"][: len(bodies)] = self._spin_momentum(turn, spin)
+        return rows
+
+    def _reset(self, worlds: Array) -> None:
+        """Puts the chosen worlds into the scene's state, at time zero."""
+        self._state.mover[worlds] = self._initial
+        self._state.world["time"][worlds] = 0.0
         self._forget(worlds)
 
     @property
@@ -126,6 +127,7 @@ class World:
     def _forget(self, worlds: Array) -> None:
         """Clears what is hidden: candidates, contact memories, forces, divergence."""
         state = self._state
+        self._rows_valid = False
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
         state.side["first_touch"][worlds] = np.nan
@@ -147,16 +149,18 @@ class World:
 
     def _run(self, h: float, substeps: int) -> None:
         kernel = self._advance
-        model, state, together = self._model, self._state, self.fidelity.collision_substeps
+        model, state, rows = self._model, self._state, self._rows
+        together = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
 
         def run(first: int, last: int) -> int:
             work = idle.pop() if idle else Work.of(model)
-            failed = int(kernel(model, state, work, first, last, h, substeps, together))
+            failed = int(kernel(model, state, work, rows, first, last, h, substeps, together))
             idle.append(work)
             return failed
 
         if share_out(run, groups, self.threads) == 0:
+            self._rows_valid = True  # a world that diverged before isn't written again
             return
         if state.world["diverged"].any():
             self._raise_diverged(h)
@@ -255,9 +259,10 @@ class World:
 
     def read(self) -> Readout:
         """A copy of all poses and velocities, drives after the bodies, in one pass."""
-        rows = np.empty((self.count, len(self._model.mover), WIDTH))
-        self._readout(self._model, self._state, rows)
-        return Readout(rows)
+        if not self._rows_valid:
+            self._readout(self._model, self._state, self._rows)
+            self._rows_valid = True
+        return Readout(self._rows.copy())
 
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""
@@ -419,7 +424,8 @@ class World:
         # what isn't given stays: the spin, not its momentum, where only the orientation changes
         spin = new.get("angular_velocity")
         if spin is None and "orientation" in new:
-            spin = self.angular_velocity[mask]
+            turning = state.mover["angular_momentum"][mask].any()
+            spin = self.angular_velocity[mask] if turning else None
         if "position" in new:
             state.mover["position"][mask, :bodies] = new["position"]
         if "orientation" in new:
@@ -469,6 +475,7 @@ class World:
             )
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
+        self._rows_valid = False
 
     def _find_kernels(self) -> None:
         self._advance = make_advance(self._features)

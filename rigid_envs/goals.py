@@ -1,0 +1,73 @@
+"""Distance of goals, and what of a row lies within its bounds: one pass over all worlds."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from physics.jit import entry, kernel
+
+Array = np.ndarray
+
+
+@kernel
+def _apart(a, b, first, n, i):
+    """Distance of a[i, first : first + n] and b[i, :n]."""
+    total = 0.0
+    for c in range(n):
+        d = np.float64(a[i, first + c]) - np.float64(b[i, c])
+        total += d * d
+    return math.sqrt(total)
+
+
+@entry
+def _distances(a, b, out):
+    for i in range(out.shape[0]):
+        out[i] = _apart(a, b, 0, a.shape[1], i)
+
+
+@entry
+def _judge(values, low, high, goals, apart, outside):
+    split = values.shape[1] - goals.shape[1]
+    for i in range(values.shape[0]):
+        beyond = False
+        for c in range(values.shape[1]):
+            x = values[i, c]
+            if x < low[c]:
+                values[i, c] = low[c]
+                beyond = True
+            elif x > high[c]:
+                values[i, c] = high[c]
+                beyond = True
+        outside[i] = beyond
+        apart[i] = _apart(values, goals, split, goals.shape[1], i)
+
+
+def distance(a: Any, b: Any) -> Any:
+    """Euclidean distance over the last axis, [...] m; the other axes broadcast."""
+    a, b = np.asarray(a), np.asarray(b)
+    if a.shape != b.shape:
+        a, b = np.broadcast_arrays(a, b)
+    rows = (-1, a.shape[-1])
+    flat_a = np.ascontiguousarray(a, dtype=np.float64).reshape(rows)
+    flat_b = np.ascontiguousarray(b, dtype=np.float64).reshape(rows)
+    out = np.empty(len(flat_a))
+    _distances(flat_a, flat_b, out)
+    return out.reshape(a.shape[:-1])[()]
+
+
+def judge(values: Array, low: Array, high: Array, goals: Array) -> tuple[Array, Array]:
+    """Clips rows to their bounds, and tells how far each is from its goal.
+
+    Args:
+        values: [n, observation + goal] float32, C-contiguous; clipped in place.
+        low: [observation + goal] float32.
+        high: likewise.
+        goals: [n, goal] float32, C-contiguous.
+
+    Returns:
+        distance [n] m of the goal that ends a row and the one wanted; whether [n] it was clipped.
+    """
+    apart, outside = np.empty(len(values)), np.empty(len(values), dtype=bool)
+    _judge(values, low, high, goals, apart, outside)
+    return apart, outside
