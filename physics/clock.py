@@ -94,7 +94,7 @@ def make_write_back(features: Features):
 
 @cache
 def make_advance(features: Features):
-    """Entry point that advances the worlds of groups first <= g < last by substeps * h seconds.
+    """Entry point that advances the chosen worlds of groups first <= g < last by substeps * h s.
 
     It writes their rows of a readout, and returns how many of them have diverged or run out of room for candidates.
 
@@ -108,18 +108,21 @@ def make_advance(features: Features):
     write_back = make_write_back(features)
 
     @entry
-    def advance(model, state, work, rows, first, last, h, substeps, collision_substeps):
+    def advance(model, state, work, rows, chosen, first, last, h, substeps, collision_substeps):
         _ = sources
         place_statics(model, work)
-        failed = 0
         for g in range(first, last):
-            load(model, state, work, g)
+            load(model, state, work, chosen, g)
             lane = work.lane[0]
-            stale = 0
+            active, stale = 0, 0
+            for i in range(LANES):
+                active += lane.active[i]
+                stale += lane.stale[i]
+            if active == 0:
+                continue
             for i in range(LANES):
                 if lane.active[i]:
                     state.world[g * LANES + i].overflow = 0
-                stale += lane.stale[i]
             if stale > 0:
                 refresh(model, state, work, g)
             done = 0
@@ -131,9 +134,10 @@ def make_advance(features: Features):
                 if done == substeps:
                     break
                 collision_step(model, state, work, g)
-            for w in range(g * LANES, min((g + 1) * LANES, state.world.shape[0])):
-                status = state.world[w]
-                failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
+        failed = 0
+        for w in range(first * LANES, min(last * LANES, chosen.shape[0])):
+            status = state.world[w]
+            failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
         return failed
 
     return advance

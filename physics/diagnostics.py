@@ -66,10 +66,10 @@ def _make_report(features: Features) -> Any:
     side = make_side(features, True)
 
     @entry
-    def report(model, state, work, rows):
+    def report(model, state, work, chosen, rows):
         _ = sources
         place_statics(model, work)
-        load(model, state, work, 0)
+        load(model, state, work, chosen, 0)
         kinematics(model, work)
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
@@ -90,7 +90,8 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
         candidate=state.candidate[alone].copy(),  # contacts remember; a look leaves no trace
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
-    _make_report(features)(model, copied, Work.of(model), rows)
+    everyone = np.ones(len(copied.world), dtype=bool)
+    _make_report(features)(model, copied, Work.of(model), everyone, rows)
     return rows
 
 

@@ -61,7 +61,7 @@ REMEMBERED = np.dtype(
 # one row in all
 LANE = np.dtype(
     [
-        ("active", "i8", (LANES,)),  # 0: no world, or one that has diverged
+        ("active", "i8", (LANES,)),  # 0: no world, or one that has diverged or isn't advanced
         ("stale", "i8", (LANES,)),
         ("start", "f8", (LANES,)),  # s, time at which this call began
     ],
@@ -119,12 +119,12 @@ def count_slots(work, k):
 
 
 @stage
-def load(model, state, work, g):
-    """Takes the worlds of group g into the lanes; a lane without a world rests at the origin."""
+def load(model, state, work, chosen, g):
+    """Takes the chosen worlds of group g into the lanes; other lanes rest at the origin."""
     lane = work.lane[0]
     for i in range(LANES):
         w = g * LANES + i
-        active = w < state.world.shape[0] and state.world[w].diverged == 0
+        active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
         lane.active[i] = 1 if active else 0
         lane.stale[i] = 1 if active and state.world[w].stale != 0 else 0
         lane.start[i] = state.world[w].time if active else 0.0

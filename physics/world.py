@@ -135,32 +135,37 @@ class World:
 
     # --- time ---------------------------------------------------------------------------------
 
-    def advance(self, time: float) -> None:
-        """Advances all worlds by `time` s, in whole substeps no longer than the fidelity's.
+    def advance(self, time: float, worlds: Any = None) -> None:
+        """Advances worlds by `time` s, in whole substeps no longer than the fidelity's.
+
+        Args:
+            time: s.
+            worlds: mask [count] of the worlds to advance, the others stay as they are; all if None.
 
         Raises:
-            TypeError, ValueError: `time` isn't a positive finite number.
+            TypeError, ValueError: `time` isn't a positive finite number; a bad mask.
             SimulationDiverged: a world turned non-finite; the others have advanced and are whole.
             ContactOverflow: more particle pairs touch than there is room for.
         """
         span = positive("time", time)
         substeps = cut(span, self.fidelity.substep)
-        self._run(span / substeps, substeps)
+        self._run(span / substeps, substeps, self._mask(worlds))
 
-    def _run(self, h: float, substeps: int) -> None:
+    def _run(self, h: float, substeps: int, worlds: Array) -> None:
         kernel = self._advance
         model, state, rows = self._model, self._state, self._rows
         together = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
 
-        def run(first: int, last: int) -> int:
+        def run(first: int, last: int) -> Any:
             work = idle.pop() if idle else Work.of(model)
-            failed = int(kernel(model, state, work, rows, first, last, h, substeps, together))
+            failed = kernel(model, state, work, rows, worlds, first, last, h, substeps, together)
             idle.append(work)
             return failed
 
         if share_out(run, groups, self.threads) == 0:
-            self._rows_valid = True  # a world that diverged before isn't written again
+            # a world that diverged before isn't written, nor one that isn't advanced
+            self._rows_valid = self._rows_valid or bool(worlds.all())
             return
         if state.world["diverged"].any():
             self._raise_diverged(h)
@@ -198,7 +203,7 @@ class World:
         stale = self._state.world["stale"] != 0
         if stale.any():
             try:
-                self._run(self.fidelity.substep, 0)
+                self._run(self.fidelity.substep, 0, stale)
             finally:
                 self._state.world["stale"][stale] = 1
 

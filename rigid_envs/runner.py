@@ -165,14 +165,28 @@ class Runner:
             )
         return clipped
 
-    def step(self, actions: Any) -> Step:
-        """Advances every world by a frame."""
+    def step(self, actions: Any, begun: Array | None = None) -> Step:
+        """Advances every world by a frame, or starts an episode in it.
+
+        Args:
+            actions: [count, actions] within [-1, 1].
+            begun: mask [count] of the worlds that start their next episode in place of a frame.
+
+        Raises:
+            ValueError: see `check_actions`.
+            SimulationDiverged: a world turned non-finite; the others are whole.
+        """
         self.task.act(self.world, self._now, self.check_actions(actions))
-        self._elapsed += 1  # first, as the other worlds advance even if one of them diverges
+        if begun is None or not begun.any():
+            begun = None
+        # first, as the other worlds advance even if one of them diverges
+        self._elapsed += 1
         try:
-            self.world.advance(self.task.frame)
+            self.world.advance(self.task.frame, None if begun is None else ~begun)
         finally:
             self._now = self.world.read()
+        if begun is not None:
+            self.reset(begun)
         observation, info = self.observe()
         reward = self.task.reward
         if self.reward_type == "sparse":
@@ -186,6 +200,9 @@ class Runner:
         truncated = info["out_of_bounds"]
         if self.max_episode_steps is not None:
             truncated = truncated | (self._elapsed >= self.max_episode_steps)
+        if begun is not None:
+            rewards[begun] = 0.0
+            terminated, truncated = terminated & ~begun, truncated & ~begun
         return Step(observation, rewards, terminated, truncated, info)
 
     def get_state(self) -> dict[str, Any]:

@@ -137,19 +137,16 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
                 f"worlds {worlds[:8].tolist()}{'...' if len(worlds) > 8 else ''} have ended: call "
                 'reset(options={"reset_mask": terminated | truncated}) first'
             )
+        if self.autoreset_mode == AutoresetMode.NEXT_STEP:
+            # this step is the reset of the worlds that ended in the last one
+            observation, reward, terminated, truncated, info = self._runner.step(
+                actions, self._ended
+            )
+            self._ended = terminated | truncated
+            return observation, reward, terminated, truncated, _with_masks(info, self.num_envs)
+
         observation, reward, terminated, truncated, info = self._runner.step(actions)
         infos = info
-        if self.autoreset_mode == AutoresetMode.NEXT_STEP:
-            if self._ended.any():
-                # this step is the reset of the worlds that ended in the last one
-                begun = self._ended
-                self._runner.reset(begun)
-                observation, infos = self._runner.observe()
-                reward[begun] = 0.0
-                terminated, truncated = terminated & ~begun, truncated & ~begun
-            self._ended = terminated | truncated
-            return observation, reward, terminated, truncated, _with_masks(infos, self.num_envs)
-
         ended = terminated | truncated
         if self.autoreset_mode == AutoresetMode.DISABLED:
             self._ended = ended
