@@ -13,7 +13,7 @@ import numpy as np
 from physics.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.fidelity import Fidelity
 from physics.scene import NO_TURN, Body, Drive, Ground, Material, Scene, Static
-from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Samples, Sphere, Surface
+from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Box, Samples, Sphere, Surface
 from physics.stages.friction import tangential_coefficients
 from physics.stages.normal_force import damping_coefficient, rest_speed
 
@@ -174,6 +174,15 @@ def _shear_mass(solid: Solid) -> float:
     return 1.0 / (1.0 / solid.mass + arm**2 / float(solid.shape.inertia(solid.mass).min()))
 
 
+def _leverage(solid: Solid) -> float:
+    """See `tangential_coefficients`: of a box that lies on its widest face; balls don't rock."""
+    if not isinstance(solid, Body) or not isinstance(solid.shape, Box):
+        return 0.0
+    height, *sides = sorted(solid.shape.half_extents)
+    # three quarters of a face's weight lie on the two edges across the motion, one on its middle
+    return sum(height**2 / (0.75 * side**2) for side in sides) / 2.0
+
+
 def _mover_row(solid: Solid, gravity: Array) -> tuple[object, ...]:
     """A row of MOVER."""
     assert isinstance(solid, Body | Drive)
@@ -216,7 +225,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
             stiffness = pair_mass * omega**2
         shear_mass = 1.0 / (1.0 / _shear_mass(a) + 1.0 / _shear_mass(b))
         row["shear_stiffness"], row["shear_damping"] = tangential_coefficients(
-            stiffness, pair_mass, shear_mass
+            stiffness, pair_mass, shear_mass, _leverage(a) + _leverage(b), fidelity.substep
         )
         damping = damping_coefficient(restitution, fidelity.damping)
         row["owner"], row["surface"], row["kind"] = pair.owner, pair.other, pair.surface.kind

@@ -1,5 +1,6 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,8 +69,9 @@ class World:
         self._idle: list[Work] = []
         self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
         self._state = allocate(self._model, self._features, self.count)
+        self._everyone = np.ones(self.count, dtype=bool)
         self._initial = self._initial_rows()
-        self._reset(np.ones(self.count, dtype=bool))
+        self._reset(self._everyone)
 
     def __repr__(self) -> str:
         """Names what the world is made of."""
@@ -86,6 +88,9 @@ class World:
             return
         step, body = stability.of_scene(self.scene, self._model, self.fidelity.spacing)
         if self.fidelity.substep > step:
+            for _ in range(8):  # friction's damping depends on the step as well, a little
+                model, _ = build(self.scene, replace(self.fidelity, substep=step))
+                step, body = stability.of_scene(self.scene, model, self.fidelity.spacing)
             raise ValueError(
                 f"Material.stiffness {max(given):g} N/m makes the substep of "
                 f"{self.fidelity.substep:g} s unstable: body {body} binds, and the largest safe "
@@ -345,7 +350,7 @@ class World:
 
     def _mask(self, worlds: Any) -> Array:
         if worlds is None:
-            return np.ones(self.count, dtype=bool)
+            return self._everyone
         mask = np.asarray(worlds)
         if mask.dtype != bool or mask.shape != (self.count,):
             raise ValueError(

@@ -4,12 +4,18 @@ A contact remembers how far it has been sheared, xi. The trial force -k_t xi - c
 cone |f| <= mu N. Where it is cut, xi becomes what would give the cut force at the present speed,
 xi = -(f + c_t u)/k_t (Luding), so the force is continuous when sliding ends.
 
-That rule also fixes where a body comes to rest. Sliding ends at the speed u1 = c_t mu g / k_t with
-xi1 = (mu g m - c_t u1) / k_t, and the body then rests where xi is zero, that is -xi1 further on.
-Coulomb's law says u1^2 / (2 mu g). Both agree if c_t^2 = 2 k_t m, damping at 1/sqrt(2) of critical,
-for a body that doesn't rock. Rocking is a spring in series whose share depends on the shape: it
-leaves an error of length, at most about half the sink for a cube, whatever the speed
-(`python -m benchmarks.accuracy`).
+That rule also fixes where a body comes to rest. With a = mu g and half-step speeds, sliding ends in
+the step whose speed u falls below c a / k_t, at the shear xi = (m a - c u_before) / k_t, and the
+body then rests where xi is zero: -xi further on. Meanwhile a body pitched forward by the force under
+it swings back, and its centre with it, by m a h^2 / k_rock: h is its height over the face, k_rock
+the stiffness of that face against rocking. Coulomb's law leaves it u^2 / (2 a) to go. All agree, in
+the mean over where in a step sliding ends, if
+
+    c^2 + dt k_t c - 2 k_t m (1 + k_t h^2 / k_rock) - (dt k_t)^2 / 12 = 0,
+
+which `tangential_coefficients` solves for c: near 1/sqrt(2) of critical damping. What is left is a
+length of at most a dt^2 / 8, and for a box that lies on another than its widest face, that face's
+share of rocking (`python -m benchmarks.accuracy`).
 """
 
 import math
@@ -18,7 +24,7 @@ from physics.jit import stage
 
 
 def tangential_coefficients(
-    stiffness: float, pair_mass: float, shear_mass: float
+    stiffness: float, pair_mass: float, shear_mass: float, leverage: float, step: float
 ) -> tuple[float, float]:
     """Shear stiffness N/m and damping N s/m of a pair.
 
@@ -28,9 +34,13 @@ def tangential_coefficients(
         shear_mass: kg that a tangential force at the surface feels; turning makes it less than the
             pair mass, and the shear spring that much softer, so that no tangential mode is faster
             than the normal ones.
+        leverage: stiffness times the square of the height over the face, by the stiffness against
+            rocking.
+        step: s.
     """
-    shear_stiffness = 2.0 / 3.0 * stiffness * shear_mass / pair_mass
-    return shear_stiffness, math.sqrt(2.0 * shear_stiffness * pair_mass)
+    k = 2.0 / 3.0 * stiffness * shear_mass / pair_mass
+    rocking = 2.0 * k * pair_mass * (1.0 + leverage * k / stiffness)
+    return k, 0.5 * (math.sqrt(4.0 / 3.0 * (k * step) ** 2 + 4.0 * rocking) - k * step)
 
 
 @stage

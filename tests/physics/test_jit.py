@@ -22,7 +22,7 @@ from physics import Body, Scene, Sphere, World
 from physics.clock import make_advance
 world = World(Scene([Body(Sphere(0.1))]))
 world.advance(1.0)
-stats = make_advance(world.features).stats
+stats = make_advance(world.features).compiled.stats
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), world.position[0, 0, 2])
 """
 
@@ -110,7 +110,7 @@ def test_every_entry_point_carries_the_key_of_the_cache():
     world = World(scenes.push_like())
     from physics.clock import make_advance
 
-    function = make_advance(world.features).py_func
+    function = make_advance(world.features).compiled.py_func
     cells = [c.cell_contents for c in function.__closure__]
     assert jit.SOURCES in [c for c in cells if isinstance(c, int)]
 
