@@ -96,7 +96,8 @@ def make_write_back(features: Features):
 def make_advance(features: Features):
     """Entry point that advances the chosen worlds of groups first <= g < last by substeps * h s.
 
-    It writes their rows of a readout, and returns how many of them have diverged or run out of room for candidates.
+    It writes their rows of a readout, and returns how many of them have diverged or run out of
+    room for candidates.
 
     Every world runs the same instructions in its own lane, so its result is the same to the last
     bit whatever runs beside it, and however groups are shared out over threads.

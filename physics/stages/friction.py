@@ -4,12 +4,12 @@ A contact remembers how far it has been sheared, xi. The trial force -k_t xi - c
 cone |f| <= mu N. Where it is cut, xi becomes what would give the cut force at the present speed,
 xi = -(f + c_t u)/k_t (Luding), so the force is continuous when sliding ends.
 
-That rule also fixes where a body comes to rest. With a = mu g and half-step speeds, sliding ends in
-the step whose speed u falls below c a / k_t, at the shear xi = (m a - c u_before) / k_t, and the
-body then rests where xi is zero: -xi further on. Meanwhile a body pitched forward by the force under
-it swings back, and its centre with it, by m a h^2 / k_rock: h is its height over the face, k_rock
-the stiffness of that face against rocking. Coulomb's law leaves it u^2 / (2 a) to go. All agree, in
-the mean over where in a step sliding ends, if
+That rule also fixes where a body comes to rest. With a = mu g and half-step speeds, sliding ends
+in the step whose speed u falls below c a / k_t, at the shear xi = (m a - c u_before) / k_t, and the
+body then rests where xi is zero: -xi further on. Meanwhile a body pitched forward by the force
+under it swings back, and its centre with it, by m a h^2 / k_rock: h is its height over the face,
+k_rock the stiffness of that face against rocking. Coulomb's law leaves it u^2 / (2 a) to go. All
+agree, in the mean over where in a step sliding ends, if
 
     c^2 + dt k_t c - 2 k_t m (1 + k_t h^2 / k_rock) - (dt k_t)^2 / 12 = 0,
 
