@@ -163,7 +163,10 @@ class World:
         groups, idle = -(-self.count // LANES), self._idle
 
         def run(first: int, last: int) -> Any:
-            work = idle.pop() if idle else Work.of(model)
+            try:
+                work = idle.pop()
+            except IndexError:  # as many as threads are made, once
+                work = Work.of(model)
             failed = kernel(model, state, work, rows, worlds, first, last, h, substeps, together)
             idle.append(work)
             return failed
@@ -174,9 +177,9 @@ class World:
             return
         if state.world["diverged"].any():
             self._raise_diverged(h)
-        worlds = np.flatnonzero(state.world["overflow"]).tolist()
+        full = np.flatnonzero(state.world["overflow"]).tolist()
         raise ContactOverflow(
-            f"worlds {worlds}: two bodies have more than eight touching particle pairs a "
+            f"worlds {full}: two bodies have more than eight touching particle pairs a "
             "particle; they overlap deeply, or Fidelity.skin is too wide"
         )
 
