@@ -60,6 +60,8 @@ def candidate_dtype(features: Features) -> np.dtype:
     ]
     if features.friction:
         fields.append(("shear", "f8", (3, LANES)))  # m
+    if features.box:
+        fields.append(("face", "f8", (LANES,)))  # by which it came into a box, see box_distance
     if features.particles:
         fields.append(("partner", "f8", (3, LANES)))  # m, particle of the surface
     return np.dtype(fields, align=True)

@@ -29,7 +29,7 @@ def make_search(features):
         kind, a, b, c = side.kind, side.core[0], side.core[1], side.core[2]
         d = z
         if box and kind == BOX:
-            d = box_distance(x, y, z, a, b, c)[0]
+            d = box_distance(x, y, z, a, b, c, 0.0)[0]
         if sphere and kind == SPHERE:
             d = sphere_distance(x, y, z, a, b, c)[0]
         if capsule and kind == CAPSULE:
@@ -51,6 +51,8 @@ def make_search(features):
         if friction:
             for axis in range(3):
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
+        if box:
+            row.face[i] = old[cursor].face if known else 0.0
         return cursor
 
     @kernel
@@ -62,6 +64,8 @@ def make_search(features):
         if friction:
             for axis in range(3):
                 memory.shear[axis] = row.shear[axis, i]
+        if box:
+            memory.face = row.face[i]
 
     @kernel
     def clear(row, i):
@@ -69,6 +73,8 @@ def make_search(features):
         row.weight[i] = 0.0
         row.impact_speed[i] = 0.0
         row.load[i] = 0.0
+        if box:
+            row.face[i] = 0.0
         for axis in range(3):
             row.sample[axis, i] = 0.0
             if friction:

@@ -40,7 +40,8 @@ def make_loop(features, kind, report):
     friction = features.friction
     normal_force = dashpot_force if features.dashpot else overlap_force
     plane, particles = kind == PLANE, kind == PARTICLES
-    surface_distance = {BOX: box_distance, CAPSULE: capsule_distance}.get(kind, sphere_distance)
+    box = kind == BOX
+    surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
 
     @kernel
     def loop(slots, candidate, seen, constants, h, rows):
@@ -70,7 +71,12 @@ def make_loop(features, kind, report):
                         px -= row.partner[0, i]
                         py -= row.partner[1, i]
                         pz -= row.partner[2, i]
-                    distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
+                    if box:
+                        distance, nx, ny, nz, face = box_distance(
+                            px, py, pz, ca, cb, cc, row.face[i]
+                        )
+                    else:
+                        distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
                     overlap = radius - distance
                     arm = owner_radius - 0.5 * overlap
                     rx -= arm * nx
@@ -99,6 +105,9 @@ def make_loop(features, kind, report):
                 # a step of no length is a look, and not remembered
                 memories[i] = memory if lasts else memories[i]
                 loads[i] = load if lasts else loads[i]
+                if box:
+                    face = face if weight > 0.0 else 0.0
+                    row.face[i] = face if lasts else row.face[i]
                 if plane:
                     fx, fy, fz = 0.0, 0.0, normal
                 else:

@@ -1,7 +1,7 @@
 """Distance of a point from the core of a surface, and the outward normal there.
 
 Points are in the surface's own frame. Each function is free of branches that a vector lane can't
-take, and returns (distance m, normal x y z).
+take, and returns (distance m, normal x y z) and, for a box, the face.
 """
 
 import math
@@ -28,8 +28,13 @@ def capsule_distance(x, y, z, a, b, half_length):
 
 
 @stage
-def box_distance(x, y, z, a, b, c):
-    """From a box of half extents a, b, c; negative inside, where the nearest face decides."""
+def box_distance(x, y, z, a, b, c, face):
+    """From a box of half extents a, b, c; negative inside.
+
+    Inside, the face by which the point came in decides: the nearest one may be the wrong side of an
+    edge. `face` is that face, +-1 for +-x, 2 for y, 3 for z, or 0 for a point that was inside from
+    the start, which leaves by the nearest. The fifth result is the face to remember.
+    """
     qx = abs(x) - a
     qy = abs(y) - b
     qz = abs(z) - c
@@ -37,19 +42,17 @@ def box_distance(x, y, z, a, b, c):
     oy = max(qy, 0.0)
     oz = max(qz, 0.0)
     out = math.sqrt(ox * ox + oy * oy + oz * oz)
-    deepest = max(qx, max(qy, qz))
-    outside = deepest > 0.0
-    inverse = 1.0 / max(out, 1e-150)
-    on_x = qx >= max(qy, qz)
-    on_y = (not on_x) & (qy >= qz)
+    outside = max(qx, max(qy, qz)) > 0.0
+    known = (not outside) & (face != 0.0)
+    on_x = abs(face) == 1.0 if known else qx >= max(qy, qz)
+    on_y = abs(face) == 2.0 if known else (not on_x) & (qy >= qz)
     ix = 1.0 if on_x else 0.0
     iy = 1.0 if on_y else 0.0
-    nx = ox * inverse if outside else ix
-    ny = oy * inverse if outside else iy
-    nz = oz * inverse if outside else 1.0 - ix - iy
-    return (
-        out if outside else deepest,
-        math.copysign(nx, x),
-        math.copysign(ny, y),
-        math.copysign(nz, z),
-    )
+    iz = 1.0 - ix - iy
+    side = math.copysign(1.0, face if known else ix * x + iy * y + iz * z)
+    inverse = 1.0 / max(out, 1e-150)
+    nx = math.copysign(ox * inverse, x) if outside else ix * side
+    ny = math.copysign(oy * inverse, y) if outside else iy * side
+    nz = math.copysign(oz * inverse, z) if outside else iz * side
+    depth = side * (ix * x + iy * y + iz * z) - (ix * a + iy * b + iz * c)
+    return out if outside else depth, nx, ny, nz, side * (ix + 2.0 * iy + 3.0 * iz)
