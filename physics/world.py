@@ -70,6 +70,7 @@ class World:
         self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
         self._state = allocate(self._model, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
+        self._span, self._substeps = 0.0, 0
         self._initial = self._initial_rows()
         self._reset(self._everyone)
 
@@ -152,9 +153,10 @@ class World:
             SimulationDiverged: a world turned non-finite; the others have advanced and are whole.
             ContactOverflow: more particle pairs touch than there is room for.
         """
-        span = positive("time", time)
-        substeps = cut(span, self.fidelity.substep)
-        self._run(span / substeps, substeps, self._mask(worlds))
+        if type(time) is not float or time != self._span:  # frames are all of one length
+            self._span = positive("time", time)
+            self._substeps = cut(self._span, self.fidelity.substep)
+        self._run(self._span / self._substeps, self._substeps, self._mask(worlds))
 
     def _run(self, h: float, substeps: int, worlds: Array) -> None:
         kernel = self._advance

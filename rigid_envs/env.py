@@ -142,4 +142,4 @@ def _first(observation: Observation) -> Observation:
 
 
 def _first_info(info: dict[str, Array]) -> dict[str, Any]:
-    return {name: values[0].item() for name, values in info.items()}
+    return {name: values.item() for name, values in info.items()}

@@ -48,12 +48,13 @@ def distance(a: Any, b: Any) -> Any:
     a, b = np.asarray(a), np.asarray(b)
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)
-    rows = (-1, a.shape[-1])
-    flat_a = np.ascontiguousarray(a, dtype=np.float64).reshape(rows)
-    flat_b = np.ascontiguousarray(b, dtype=np.float64).reshape(rows)
+    flat_a = np.ascontiguousarray(a, dtype=np.float64)
+    flat_b = np.ascontiguousarray(b, dtype=np.float64)
+    if a.ndim != 2:
+        flat_a, flat_b = flat_a.reshape(-1, a.shape[-1]), flat_b.reshape(-1, a.shape[-1])
     out = np.empty(len(flat_a))
     _distances(flat_a, flat_b, out)
-    return out.reshape(a.shape[:-1])[()]
+    return out if a.ndim == 2 else out.reshape(a.shape[:-1])[()]
 
 
 def judge(values: Array, low: Array, high: Array, goals: Array) -> tuple[Array, Array]:

@@ -34,13 +34,13 @@ class Reward:
         """Whether goals at these distances [...] m agree."""
         return apart <= self.threshold
 
-    def sparse(self, apart: Array) -> Array:
-        """-1 or 0, [...]; a function of the goals' distance alone."""
-        return self.success(apart) - 1.0
+    def sparse(self, success: Any) -> Any:
+        """-1 or 0, [...]; a function of the goals alone."""
+        return success - 1.0
 
-    def dense(self, apart: Array, terms: Mapping[str, Array]) -> Array:
+    def dense(self, success: Any, apart: Any, terms: Mapping[str, Array]) -> Any:
         """The shaped reward, [...]."""
-        reward = self.success(apart) - apart / self.scale
+        reward = success - apart / self.scale
         for name, weight in self.weights.items():
             reward += weight * terms[name]
         return reward
@@ -65,7 +65,11 @@ class Reward:
                 f"and {desired.shape}"
             )
         apart = np.asarray(distance(achieved, desired))
-        reward = self.sparse(apart) if kind == "sparse" else self.dense(apart, self._terms(info))
+        success = self.success(apart)
+        if kind == "sparse":
+            reward = self.sparse(success)
+        else:
+            reward = self.dense(success, apart, self._terms(info))
         return float(reward) if achieved.ndim == 1 else reward
 
     def _terms(self, info: Any) -> dict[str, Array]:

@@ -190,9 +190,9 @@ class Runner:
         observation, info = self.observe()
         reward = self.task.reward
         if self.reward_type == "sparse":
-            rewards = reward.sparse(self._apart)
+            rewards = reward.sparse(info["is_success"])
         else:
-            rewards = reward.dense(self._apart, info)
+            rewards = reward.dense(info["is_success"], self._apart, info)
         if self.terminate_on_success:
             terminated = info["is_success"].copy()
         else:
