@@ -54,6 +54,7 @@ REMEMBERED = np.dtype(
         ("impact_speed", "f8"),
         ("load", "f8"),
         ("shear", "f8", (3,)),
+        ("slid", "f8"),
         ("face", "f8"),
     ],
     align=True,

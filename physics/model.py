@@ -49,6 +49,7 @@ SIDE = np.dtype(
         ("partner_count", "i8"),
         ("first_slot", "i8"),  # room for candidates
         ("slot_count", "i8"),
+        ("sharp", "i8"),  # 1: corners and edges of a box, which faces push out
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
@@ -234,6 +235,8 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
             row["first_partner"], row["partner_count"] = add(pair.partners)
         row["first_slot"], row["slot_count"] = slots, _capacity(pair)
         slots += int(row["slot_count"])
+        particles = fidelity.geometry == "particle" and isinstance(a, Body)
+        row["sharp"] = not isinstance(a, Ground) and isinstance(a.shape, Box) and not particles
         row["core"] = pair.surface.parameters
         row["owner_radius"] = pair.samples.radius
         row["radius"] = pair.samples.radius + pair.surface.radius

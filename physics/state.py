@@ -60,6 +60,7 @@ def candidate_dtype(features: Features) -> np.dtype:
     ]
     if features.friction:
         fields.append(("shear", "f8", (3, LANES)))  # m
+        fields.append(("slid", "f8", (LANES,)))  # N, see friction_force
     if features.box:
         fields.append(("face", "f8", (LANES,)))  # by which it came into a box, see box_distance
     if features.particles:

@@ -1,5 +1,6 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -70,7 +71,7 @@ class World:
         self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
         self._state = allocate(self._model, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
-        self._span, self._substeps = 0.0, 0
+        self._span, self._substeps = math.nan, 0
         self._initial = self._initial_rows()
         self._reset(self._everyone)
 

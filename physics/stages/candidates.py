@@ -29,7 +29,7 @@ def make_search(features):
         kind, a, b, c = side.kind, side.core[0], side.core[1], side.core[2]
         d = z
         if box and kind == BOX:
-            d = box_distance(x, y, z, a, b, c, 0.0)[0]
+            d = box_distance(x, y, z, a, b, c, 0.0, side.radius, side.sharp != 0)[0]
         if sphere and kind == SPHERE:
             d = sphere_distance(x, y, z, a, b, c)[0]
         if capsule and kind == CAPSULE:
@@ -49,6 +49,7 @@ def make_search(features):
         row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
         row.load[i] = old[cursor].load if known else 0.0
         if friction:
+            row.slid[i] = old[cursor].slid if known else 0.0
             for axis in range(3):
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
         if box:
@@ -62,6 +63,7 @@ def make_search(features):
         memory.impact_speed = row.impact_speed[i]
         memory.load = row.load[i]
         if friction:
+            memory.slid = row.slid[i]
             for axis in range(3):
                 memory.shear[axis] = row.shear[axis, i]
         if box:
@@ -75,6 +77,8 @@ def make_search(features):
         row.load[i] = 0.0
         if box:
             row.face[i] = 0.0
+        if friction:
+            row.slid[i] = 0.0
         for axis in range(3):
             row.sample[axis, i] = 0.0
             if friction:

@@ -52,7 +52,7 @@ def make_loop(features, kind, report):
         k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
         shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
         mu, inverse_mass = constants.friction, 1.0 / constants.pair_mass
-        lasts = h > 0.0
+        lasts, sharp = h > 0.0, constants.sharp != 0
         mass_rate = constants.pair_mass / h if lasts else 0.0
         for n in range(slots):
             row = candidate[n]
@@ -73,7 +73,7 @@ def make_loop(features, kind, report):
                         pz -= row.partner[2, i]
                     if box:
                         distance, nx, ny, nz, face = box_distance(
-                            px, py, pz, ca, cb, cc, row.face[i]
+                            px, py, pz, ca, cb, cc, row.face[i], radius, sharp
                         )
                     else:
                         distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
@@ -115,14 +115,14 @@ def make_loop(features, kind, report):
                 if friction:
                     sx, sy, sz = row.shear[0, i], row.shear[1, i], row.shear[2, i]
                     if plane:
-                        gx, gy, gz, sx, sy, sz = friction_force(
-                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0
+                        gx, gy, gz, sx, sy, sz, slid = friction_force(
+                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, row.slid[i]
                         )
                         fx += gx
                         fy += gy
                     else:
                         along = sx * nx + sy * ny + sz * nz
-                        gx, gy, gz, sx, sy, sz = friction_force(
+                        gx, gy, gz, sx, sy, sz, slid = friction_force(
                             normal,
                             ux + approach * nx,
                             uy + approach * ny,
@@ -134,11 +134,13 @@ def make_loop(features, kind, report):
                             sx - along * nx,
                             sy - along * ny,
                             sz - along * nz,
+                            row.slid[i],
                         )
                         fx += gx
                         fy += gy
                         fz += gz
                         row.shear[2, i] = sz if lasts else row.shear[2, i]
+                    row.slid[i] = slid if lasts else row.slid[i]
                     row.shear[0, i] = sx if lasts else row.shear[0, i]
                     row.shear[1, i] = sy if lasts else row.shear[1, i]
                 fx *= weight

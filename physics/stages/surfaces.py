@@ -28,12 +28,30 @@ def capsule_distance(x, y, z, a, b, half_length):
 
 
 @stage
-def box_distance(x, y, z, a, b, c, face):
+def _pick(on_x, on_y, x, y, z):
+    """One of three numbers."""
+    return x if on_x else (y if on_y else z)
+
+
+@stage
+def box_distance(x, y, z, a, b, c, face, radius, sharp):
     """From a box of half extents a, b, c; negative inside.
 
-    Inside, the face by which the point came in decides: the nearest one may be the wrong side of an
-    edge. `face` is that face, +-1 for +-x, 2 for y, 3 for z, or 0 for a point that was inside from
-    the start, which leaves by the nearest. The fifth result is the face to remember.
+    A ball rolls over the box's edges: outside, the nearest point decides (`sharp` false). The
+    corner or edge of another box is pushed out by faces alone (`sharp` true): near an edge, where
+    equal boxes have all their samples when they are stacked, a normal from the nearest point leans
+    out sideways, and would drive the stack apart. It rests on a face until it is `radius`, which is
+    all that rounds both boxes, beyond the face's border.
+
+    Args:
+        face: by which the point came, +-1 for +-x, 2 for y, 3 for z; 0 for none. While in contact
+            that face decides: deeper than the rounding, the nearest one may be the wrong side of an
+            edge. A point inside from the start leaves by the nearest.
+        radius: m.
+        sharp: see above.
+
+    Returns:
+        distance m, normal x y z, and the face to remember.
     """
     qx = abs(x) - a
     qy = abs(y) - b
@@ -43,16 +61,29 @@ def box_distance(x, y, z, a, b, c, face):
     oz = max(qz, 0.0)
     out = math.sqrt(ox * ox + oy * oy + oz * oz)
     outside = max(qx, max(qy, qz)) > 0.0
-    known = (not outside) & (face != 0.0)
-    on_x = abs(face) == 1.0 if known else qx >= max(qy, qz)
-    on_y = abs(face) == 2.0 if known else (not on_x) & (qy >= qz)
-    ix = 1.0 if on_x else 0.0
-    iy = 1.0 if on_y else 0.0
-    iz = 1.0 - ix - iy
-    side = math.copysign(1.0, face if known else ix * x + iy * y + iz * z)
+
+    # the remembered face, and how far the point is over it and beyond its border
+    axis = abs(face)
+    first, second = axis == 1.0, axis == 2.0
+    sign = math.copysign(1.0, face)
+    over = sign * _pick(first, second, x, y, z) - _pick(first, second, a, b, c)
+    beside = max(qy if first else qx, qy if axis == 3.0 else qz)
+    lasting = (over < radius) & (beside < radius) if sharp else not outside
+    known = lasting & (face != 0.0)
+
+    on_x = first if known else qx >= max(qy, qz)
+    on_y = second if known else (not on_x) & (qy >= qz)
+    side = sign if known else math.copysign(1.0, _pick(on_x, on_y, x, y, z))
+    ix = side if on_x else 0.0
+    iy = side if on_y else 0.0
+    iz = 0.0 if on_x | on_y else side
+    height = over if known else _pick(on_x, on_y, qx, qy, qz)
+    beyond = max(qy if on_x else qx, qz if on_x | on_y else qy)
+
+    round_off = outside & (not sharp)
     inverse = 1.0 / max(out, 1e-150)
-    nx = math.copysign(ox * inverse, x) if outside else ix * side
-    ny = math.copysign(oy * inverse, y) if outside else iy * side
-    nz = math.copysign(oz * inverse, z) if outside else iz * side
-    depth = side * (ix * x + iy * y + iz * z) - (ix * a + iy * b + iz * c)
-    return out if outside else depth, nx, ny, nz, side * (ix + 2.0 * iy + 3.0 * iz)
+    nx = math.copysign(ox * inverse, x) if round_off else ix
+    ny = math.copysign(oy * inverse, y) if round_off else iy
+    nz = math.copysign(oz * inverse, z) if round_off else iz
+    flat = height if beyond < radius else max(height, beyond)
+    return out if round_off else flat, nx, ny, nz, ix + 2.0 * iy + 3.0 * iz

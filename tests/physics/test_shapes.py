@@ -112,7 +112,12 @@ CORES = {
         np.linspace([0, 0, -0.3], [0, 0, 0.3], 4001),
         None,
     ),
-    "box": (lambda *p: box_distance(*p, 0.0)[:4], tuple(HALF), box_surface(HALF), HALF),
+    "box": (
+        lambda *p: box_distance(*p, 0.0, 1e-3, False)[:4],
+        tuple(HALF),
+        box_surface(HALF),
+        HALF,
+    ),
 }
 
 
@@ -138,7 +143,8 @@ def test_distance_and_normal_agree_with_brute_force(name):
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_point_inside_a_box_leaves_by_the_face_it_came_through(axis, side):
+@pytest.mark.parametrize("sharp", [False, True])
+def test_a_point_inside_a_box_leaves_by_the_face_it_came_through(axis, side, sharp):
     rng = np.random.default_rng(axis)
     normal = np.zeros(3)
     normal[axis] = side
@@ -146,10 +152,10 @@ def test_a_point_inside_a_box_leaves_by_the_face_it_came_through(axis, side):
         # over the face, then anywhere inside, nearer to other faces or beyond the middle
         over = rng.uniform(-1.0, 1.0, 3) * HALF
         over[axis] = side * (HALF[axis] + 0.01)
-        *_, face = box_distance(*over, *HALF, 0.0)
+        *_, face = box_distance(*over, *HALF, 0.0, 1e-3, sharp)
         assert face == side * (axis + 1)
         within = rng.uniform(-1.0, 1.0, 3) * HALF
-        d, *found, kept = box_distance(*within, *HALF, face)
+        d, *found, kept = box_distance(*within, *HALF, face, 1e-3, sharp)
         assert d == pytest.approx(side * within[axis] - HALF[axis])
         np.testing.assert_array_equal(found, normal)
         assert kept == face
