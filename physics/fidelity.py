@@ -59,7 +59,7 @@ class Fidelity:
 
 
 PRESETS: dict[str, Fidelity] = {
-    "fast": Fidelity(substep=4e-3, spacing=1.0, rounding=0.05),
+    "fast": Fidelity(substep=4e-3),
     "balanced": Fidelity(),
     "accurate": Fidelity(substep=0.25e-3, contact_resolution=0.2, spacing=0.25),
 }

@@ -7,6 +7,8 @@ the component g sin(theta) along +x.
 import math
 from typing import Any
 
+import numpy as np
+
 from physics.fidelity import Fidelity
 from physics.scene import Body, Drive, Ground, Material, Scene, Vector
 from physics.shapes import Box, Capsule, Shape, Sphere
@@ -102,6 +104,18 @@ def two_cubes(
         for x, fields in ((-0.03, first), (0.03, second))
     ]
     return Scene(bodies, [Ground(material, ground)], gravity=(0.0, 0.0, -gravity))
+
+
+def tower(cubes: int, jitter: float = 2e-4, seed: int = 0) -> Scene:
+    """Equal cubes of 64 g, one on the other, each set down within `jitter` m of the axis."""
+    aside = np.random.default_rng(seed).uniform(-jitter, jitter, (cubes, 2))
+    half = CUBE.half_extents[2]
+    material = Material(0.5, 0.0)
+    bodies = [
+        Body(CUBE, mass=0.064, position=(x, y, (2 * i + 1) * half), material=material)
+        for i, (x, y) in enumerate(aside)
+    ]
+    return Scene(bodies, [Ground(material)])
 
 
 def torque_free_box(

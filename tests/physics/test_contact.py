@@ -314,6 +314,21 @@ def test_two_cubes_part_after_a_fast_impact_too(speed):
     assert parting(speed, 1.0, "accurate") == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("cubes", "fidelity"),
+    [(2, "fast"), (3, "fast"), (5, "balanced"), (10, Fidelity(substep=0.5e-3))],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_tower_stands_for_a_minute(cubes, fidelity, seed):
+    world = settled(scenes.tower(cubes, seed=seed), fidelity)
+    start = world.position.copy()
+    world.advance(60.0)
+    assert np.abs(world.position - start).max() < 1e-3
+    # and stands upright, no deeper in itself than it is stiff; five cubes are near buckling and lean
+    assert np.abs(start[0, :, :2]).max() < (3e-3 if cubes == 5 else 1e-3)
+    assert start[0, -1, 2] > 0.04 * cubes - 0.02 - 0.006
+
+
 @pytest.mark.parametrize("yaw", [0.0, 45.0])
 def test_a_cube_stands_on_another(yaw):
     half = math.radians(yaw) / 2
