@@ -40,8 +40,8 @@ def tangential_coefficients(
             rocking.
         step: s.
     """
-    # Steel has 2/3 to 1 where this has 1/3, but the damping that goes with it, seen by a body between
-    # two others that pitches, would then be too much for the step: a tower chatters and creeps apart
+    # Steel has 2/3 to 1 where this has 1/3, but the damping that goes with it would be too much for
+    # a body that pitches between two others: a tower chatters and creeps apart
     k = 1.0 / 3.0 * stiffness * shear_mass / pair_mass
     rocking = 2.0 * k * pair_mass * (1.0 + leverage * k / stiffness)
     return k, 0.5 * (math.sqrt(4.0 / 3.0 * (k * step) ** 2 + 4.0 * rocking) - k * step)

@@ -43,12 +43,9 @@ def box_distance(x, y, z, a, b, c, face, radius, sharp):
     out sideways, and would drive the stack apart. It rests on a face until it is `radius`, which is
     all that rounds both boxes, beyond the face's border.
 
-    Args:
-        face: by which the point came, +-1 for +-x, 2 for y, 3 for z; 0 for none. While in contact
-            that face decides: deeper than the rounding, the nearest one may be the wrong side of an
-            edge. A point inside from the start leaves by the nearest.
-        radius: m.
-        sharp: see above.
+    `face`, by which the point came, decides while it is in contact: +-1 for +-x, 2 for y, 3 for z.
+    Deeper than the rounding, the nearest face may be the wrong side of an edge. Without one, 0, a
+    point inside leaves by the nearest.
 
     Returns:
         distance m, normal x y z, and the face to remember.

@@ -324,7 +324,7 @@ def test_a_tower_stands_for_a_minute(cubes, fidelity, seed):
     start = world.position.copy()
     world.advance(60.0)
     assert np.abs(world.position - start).max() < 1e-3
-    # and stands upright, no deeper in itself than it is stiff; five cubes are near buckling and lean
+    # and stands upright, no deeper in itself than it is stiff; five are near buckling and lean
     assert np.abs(start[0, :, :2]).max() < (3e-3 if cubes == 5 else 1e-3)
     assert start[0, -1, 2] > 0.04 * cubes - 0.02 - 0.006
 
