@@ -155,18 +155,18 @@ def penetration(model: Model, features: Features, state: State) -> Array:
     return deepest
 
 
-def contact_stiffness(
+def contact_shares(
     model: Model, features: Features, state: State, world: int
-) -> tuple[Array, Array]:
-    """Stiffness and damping matrices [6 m, 6 m] of a world's present contacts and servos.
+) -> dict[int, tuple[Array, Array]]:
+    """How a world's present contacts share their side's unit stiffness, by side.
 
-    Coordinates are each mover's displacement, then its rotation vector, in the world frame. The
-    damping is the tangential one and the servos'; that along the normal takes no more than the
-    approach speed and limits no step.
+    Returns:
+        For each side that touches two matrices [6 m, 6 m]: along the normals and across them.
+        Coordinates are each mover's displacement, then its rotation vector, in the world frame.
     """
     told = report(model, features, state, world)
     movers = len(model.mover)
-    K, C = np.zeros((6 * movers, 6 * movers)), np.zeros((6 * movers, 6 * movers))
+    shares: dict[int, tuple[Array, Array]] = {}
     for k, point, normal, weight in zip(
         told.side, told.point, told.normal, told.weight, strict=True
     ):
@@ -174,24 +174,26 @@ def contact_stiffness(
         jacobian = np.zeros((3, 6 * movers))
         for solid, sign in ((constants["owner"], 1.0), (constants["surface"], -1.0)):
             if solid < movers:
-                r = point - state.mover["position"][world, solid]
-                cross = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
-                jacobian[:, 6 * solid : 6 * solid + 3] = sign * np.eye(3)
-                jacobian[:, 6 * solid + 3 : 6 * solid + 6] = sign * cross
-        along = np.outer(normal, normal)
-        across = (np.eye(3) - along) * (constants["friction"] > 0.0)
-        stiffness = constants["stiffness"] * along + constants["shear_stiffness"] * across
-        K += weight * jacobian.T @ stiffness @ jacobian
-        C += weight * jacobian.T @ (constants["shear_damping"] * across) @ jacobian
-    for m, constants in enumerate(model.mover):
-        block = slice(6 * m, 6 * m + 3)
-        K[block, block] += constants["servo_stiffness"] * np.eye(3)
-        C[block, block] += constants["servo_damping"] * np.eye(3)
-    return K, C
+                arm = point - state.mover["position"][world, solid]
+                columns = slice(6 * solid, 6 * solid + 6)
+                jacobian[:, columns] = sign * point_jacobian(arm)
+        along = jacobian.T @ np.outer(normal, normal) @ jacobian
+        across = jacobian.T @ jacobian - along
+        before = shares.get(int(k), (0.0, 0.0))
+        shares[int(k)] = (before[0] + weight * along, before[1] + weight * across)
+    return shares
+
+
+def point_jacobian(arm: Array) -> Array:
+    """[3, 6]: how a point at `arm` [3] m from the centre moves with displacement and rotation."""
+    x, y, z = arm
+    return np.array(
+        [[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]]
+    )
 
 
 def inverse_masses(model: Model, state: State, world: int) -> Array:
-    """Inverse mass matrix [6 m, 6 m] in the coordinates of `contact_stiffness`."""
+    """Inverse mass matrix [6 m, 6 m] in the coordinates of `contact_shares`."""
     movers = len(model.mover)
     M = np.zeros((6 * movers, 6 * movers))
     turn = rotation_matrix(state.mover["orientation"][world])

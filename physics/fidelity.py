@@ -24,7 +24,7 @@ class Fidelity:
             and again within it where a body outruns the skin.
         contact_resolution: omega h of a contact, in rad a substep: the stiffness follows from it as
             mass (contact_resolution / substep)^2. Smaller is softer: it resolves an impact better
-            and sinks deeper. At most 1.
+            and sinks deeper. At most 0.7: beyond, a box at rest would chatter.
         spacing: of samples, as a fraction of the smallest width of the solid or of any body.
         rounding: of a box's edges, as a fraction of its smallest half width.
         skin: m at which a sample becomes a candidate, as a fraction of a body's smallest width.
@@ -48,7 +48,7 @@ class Fidelity:
         object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
         integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
         limits = {
-            "contact_resolution": (1e-4, 1.0),
+            "contact_resolution": (1e-4, 0.7),
             "spacing": (0.01, 1.0),
             "rounding": (1e-3, 0.5),
             "skin": (0.01, 1.0),

@@ -26,7 +26,7 @@ class Material:
         restitution: ratio of the normal speeds after and before an impact, 0 to 1. A pair has the
             larger of its two.
         stiffness: N/m of one face in contact, or None: then it follows from the fidelity's step and
-            contact resolution and from the masses of the pair, and no step is too long.
+            contact resolution and from the masses of the pair.
     """
 
     friction: float = 0.5

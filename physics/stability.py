@@ -1,94 +1,164 @@
 """The largest stable step of the spring law.
 
-Kick-drift-kick with damping taken at the half step maps a mode with M x'' + C x' + K x = 0 to
-eigenvalues that leave the unit circle through -1, where (4 M - 2 h C - h^2 K) is singular. For one
-degree of freedom that is omega h < 2 (sqrt(1 + zeta^2) - zeta). With mu = 1/h it is the quadratic
-eigenproblem 4 M mu^2 - 2 C mu - K = 0; the largest real mu gives the smallest such step. Rotation,
-damping and modes of several bodies are all in the matrices.
+Kick-drift-kick, with forces that see the half-step velocity, loses a linear mode when it flips at
+every step: u changes its sign, and the force's share at that rhythm reverses it fully. With masses
+M and h F = A u for what a step's force does to a velocity that flips, that is where the largest
+eigenvalue of M^-1 A reaches 2. A spring and an explicit damper give A = h c + h^2 k / 2, which is
+omega h < 2 (sqrt(1 + zeta^2) - zeta) for one degree of freedom. Rotation, damping and modes of
+several bodies are all in the matrices.
+
+The normal law relaxes within the step and estimates the load from the last one. With the share phi
+of spring and damper, f = phi (k d + c u) + (1 - phi) (f_before + m (u - u_before) / h), a velocity
+that flips gives A = (phi (h c + h^2 k / 2) + 2 m (1 - phi)) / (2 - phi).
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from physics import diagnostics
 from physics.features import Features
 from physics.model import Model
-from physics.scene import Body, Scene
+from physics.scene import Body, Drive, Scene
+from physics.shapes import Shape
 from physics.state import State
 
 Array = np.ndarray
 
+# A mode that flips is lost at 2
+_FLIP = 2.0
+_LONGEST = 1e3  # s, a step that no contact limits
+# partners that a body can lie between at once: a cube has six faces
+_PARTNERS = 6
 
-def largest_step(inverse_mass: Array, stiffness: Array, damping: Array) -> float:
-    """Largest stable step in s of the linear system with these matrices [n, n]; inf if free."""
-    n = len(stiffness)
-    companion = np.zeros((2 * n, 2 * n))
-    companion[:n, n:] = np.eye(n)
-    companion[n:, :n] = 0.25 * inverse_mass @ stiffness
-    companion[n:, n:] = 0.5 * inverse_mass @ damping
-    values = np.linalg.eigvals(companion)
-    real = values[np.abs(values.imag) <= 1e-6 * (1e-300 + np.abs(values))].real
-    largest = float(real.max(initial=0.0))
-    return 1.0 / largest if largest > 1e-9 else math.inf
+
+def _normal(side: Any, dashpot: bool, h: float) -> float:
+    """A in kg of a side's whole normal stiffness, for a contact that lasts."""
+    k, m, damping = float(side["stiffness"]), float(side["pair_mass"]), float(side["damping"])
+    critical = math.sqrt(k * m)
+    if dashpot:
+        x = 2.0 * damping * h * math.sqrt(k / m)
+        share = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
+        return 2.0 * damping * critical * h * share + 0.5 * h * h * k
+    # a contact that lasts is damped half critically, see normal_force.rest_speed
+    c = critical if damping > 0.0 else 0.0
+    x = h * c / m
+    phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
+    return (phi * (h * c + 0.5 * h * h * k) + 2.0 * m * (1.0 - phi)) / (2.0 - phi)
+
+
+def _across(side: Any, h: float) -> float:
+    """A in kg of a side's whole shear stiffness."""
+    if side["friction"] == 0.0:
+        return 0.0
+    return h * float(side["shear_damping"]) + 0.5 * h * h * float(side["shear_stiffness"])
+
+
+def _servo(mover: Any, h: float) -> float:
+    """A in kg of a drive's servo."""
+    return h * float(mover["servo_damping"]) + 0.5 * h * h * float(mover["servo_stiffness"])
+
+
+def _root(load: Callable[[float], float]) -> float:
+    """Step in s at which a growing load reaches the flip; inf if it never does."""
+    if load(_LONGEST) < _FLIP:
+        return math.inf
+    low, high = 1e-12, _LONGEST
+    for _ in range(60):  # in ratios: 1e15 to 1e-3 of a percent
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if load(middle) < _FLIP else (low, middle)
+    return low
+
+
+def _largest(inverse_mass: Array, A: Array) -> float:
+    """Largest eigenvalue of M^-1 A, both symmetric and not negative."""
+    return float(np.linalg.eigvals(inverse_mass @ A).real.max(initial=0.0))
 
 
 def of_contacts(model: Model, features: Features, state: State, world: int) -> float:
-    """Largest stable step in s of a world with the contacts that it has now."""
-    stiffness, damping = diagnostics.contact_stiffness(model, features, state, world)
-    return largest_step(diagnostics.inverse_masses(model, state, world), stiffness, damping)
+    """Largest stable step in s of a world with the contacts that it has now; inf if free."""
+    shares = diagnostics.contact_shares(model, features, state, world)
+    inverse = diagnostics.inverse_masses(model, state, world)
+
+    def load(h: float) -> float:
+        A = np.zeros_like(inverse)
+        for k, (along, across) in shares.items():
+            side = model.side[k]
+            A += _normal(side, features.dashpot, h) * along + _across(side, h) * across
+        for i, mover in enumerate(model.mover):
+            block = slice(6 * i, 6 * i + 3)
+            A[block, block] += _servo(mover, h) * np.eye(3)
+        return _largest(inverse, A)
+
+    return _root(load)
 
 
-def _face_factors(body: Body, spacing: float, shear: float) -> float:
-    """How much stiffer a face's contact is to a body's fastest mode than to its centre.
+def of_servo(mover: Any) -> float:
+    """Largest stable step in s of a drive that touches nothing."""
+    return _root(lambda h: _servo(mover, h) * float(mover["inverse_mass"]))
 
-    The largest eigenvalue of m M^-1 K for unit stiffness, over landings on each side of the body.
+
+def _landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
+    """Shares [6, 6] along and across the normal of a body that lies on each of its sides."""
+    positions, weights, radius = shape.samples(spacing, 0.0)
+    found = []
+    for normal in (*np.eye(3), *-np.eye(3)):
+        height = positions @ normal
+        lowest = height <= height.min() + 1e-9
+        along, across = np.zeros((6, 6)), np.zeros((6, 6))
+        for position, weight in zip(positions[lowest], weights[lowest], strict=True):
+            jacobian = diagnostics.point_jacobian(position - radius * normal)
+            pressed = jacobian.T @ np.outer(normal, normal) @ jacobian
+            along += weight * pressed
+            across += weight * (jacobian.T @ jacobian - pressed)
+        found.append((along, across))
+    return found
+
+
+def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> tuple[float, int]:
+    """A safe step in s for any state of a scene, and the index of the mover that binds it.
+
+    A bound: each mover lies flat on its six stiffest partners at once.
     """
-    assert body.mass is not None
-    positions, weights, radius = body.shape.samples(spacing, 0.0)
-    inverse = np.diag([1.0] * 3 + list(body.mass / body.shape.inertia(body.mass)))
-    largest = 1.0
-    for axis in range(3):
-        normal = np.eye(3)[axis]
-        lowest = positions[:, axis] <= positions[:, axis].min() + 1e-9
-        K = np.zeros((6, 6))
-        for r, w in zip(positions[lowest] - radius * normal, weights[lowest], strict=True):
-            cross = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
-            jacobian = np.hstack([np.eye(3), cross])
-            along = np.outer(normal, normal)
-            K += w * jacobian.T @ (along + shear * (np.eye(3) - along)) @ jacobian
-        largest = max(largest, float(np.linalg.eigvals(inverse @ K).real.max()))
-    return largest
+    movers: list[Body | Drive] = [*scene.bodies, *scene.drives]
+    if not movers:
+        return math.inf, 0
+    steps = [
+        _of_mover(model, features, i, _landings(mover.shape, spacing * mover.shape.width))
+        for i, mover in enumerate(movers)
+    ]
+    binding = int(np.argmin(steps))
+    return steps[binding], binding
 
 
-def of_scene(scene: Scene, model: Model, spacing: float) -> tuple[float, int]:
-    """A safe step in s for any state of a scene, and the index of the body that binds it.
+def _of_mover(
+    model: Model, features: Features, i: int, landings: list[tuple[Array, Array]]
+) -> float:
+    """A safe step in s for mover i in any company.
 
-    A bound: each body lands flat on its six stiffest partners at once; a contact with another
-    free body counts twice, for both may move against each other.
+    Against another that moves, its own share of their mode is (1 + its mass / the other's) of the
+    contact.
     """
-    worst, binding = math.inf, 0
-    count = len(scene.bodies)
-    for i, body in enumerate(scene.bodies):
-        assert body.mass is not None
-        rates: dict[int, tuple[float, float]] = {}
-        for side in model.side:
-            ends = (int(side["owner"]), int(side["surface"]))
-            if i not in ends:
-                continue
-            other = ends[0] if ends[1] == i else ends[1]
-            shear = float(side["shear_stiffness"] / side["stiffness"])
-            factor = _face_factors(body, spacing * body.shape.width, shear)
-            factor *= (2.0 if other < count else 1.0) / body.mass
-            rates[other] = (
-                factor * float(side["stiffness"]),
-                factor * float(side["shear_damping"] * (side["friction"] > 0.0)),
-            )
-        strongest = sorted(rates.values(), reverse=True)[:6]
-        K, C = (sum(column) for column in zip((0.0, 0.0), *strongest, strict=True))
-        if K > 0.0:
-            # 4 - 2 h C - h^2 K = 0
-            step = (math.sqrt(C * C + 4.0 * K) - C) / K
-            if step < worst:
-                worst, binding = step, i
-    return worst, binding
+    row = model.mover[i]
+    inverse = np.diag([float(row["inverse_mass"])] * 3 + list(row["inverse_inertia"]))
+    partners: dict[int, list[Any]] = {}
+    for side in model.side:
+        ends = (int(side["owner"]), int(side["surface"]))
+        if i in ends:
+            partners.setdefault(ends[0] if ends[1] == i else ends[1], []).append(side)
+
+    def load(h: float) -> float:
+        each = []
+        for other, sides in partners.items():
+            # two solids that both carry samples share their stiffness between two sides
+            share = 1.0 / len(sides)
+            if other < len(model.mover):
+                share *= 1.0 + model.mover[other]["inverse_mass"] / row["inverse_mass"]
+            normal = share * sum(_normal(side, features.dashpot, h) for side in sides)
+            shear = share * sum(_across(side, h) for side in sides)
+            each.append(max(_largest(inverse, normal * n + shear * t) for n, t in landings))
+        return float(sum(sorted(each)[-_PARTNERS:]) + _servo(row, h) * row["inverse_mass"])
+
+    return _root(load)

@@ -83,22 +83,38 @@ class World:
         )
 
     def _check_step(self, allow_unstable: bool) -> None:
-        materials = [x.material for x in (*self.scene.bodies, *self.scene.statics)]
-        materials += [x.material for x in self.scene.drives]
-        given = [m.stiffness for m in materials if m.stiffness is not None]
+        h = self.fidelity.substep
+        for i, drive in enumerate(self.scene.drives):
+            longest = stability.of_servo(self._model.mover[self._bodies + i])
+            if h >= longest and not allow_unstable:
+                raise ValueError(
+                    f"Drive.frequency {drive.frequency:g} rad/s of drive {i} makes the substep of "
+                    f"{h:g} s unstable: the largest safe step is {longest:.3g} s; lower the "
+                    "frequency, shorten Fidelity.substep, or pass allow_unstable=True"
+                )
+        given = self._given_stiffness()
         if allow_unstable or not given:
             return
-        step, body = stability.of_scene(self.scene, self._model, self.fidelity.spacing)
-        if self.fidelity.substep > step:
+        step, mover = self._safe_step(self._model)
+        if h > step:
             for _ in range(8):  # friction's damping depends on the step as well, a little
                 model, _ = build(self.scene, replace(self.fidelity, substep=step))
-                step, body = stability.of_scene(self.scene, model, self.fidelity.spacing)
+                step, mover = self._safe_step(model)
             raise ValueError(
-                f"Material.stiffness {max(given):g} N/m makes the substep of "
-                f"{self.fidelity.substep:g} s unstable: body {body} binds, and the largest safe "
-                f"step is {step:.3g} s; lower the stiffness, shorten Fidelity.substep, or pass "
-                "allow_unstable=True"
+                f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: "
+                f"{mover} binds, and the largest safe step is {step:.3g} s; lower the stiffness, "
+                "shorten Fidelity.substep, or pass allow_unstable=True"
             )
+
+    def _given_stiffness(self) -> list[float]:
+        """Stiffness in N/m of the materials that name one."""
+        solids = (*self.scene.bodies, *self.scene.statics, *self.scene.drives)
+        return [x.material.stiffness for x in solids if x.material.stiffness is not None]
+
+    def _safe_step(self, model: Model) -> tuple[float, str]:
+        """A step in s that is safe in any state, and the name of the mover that binds it."""
+        step, i = stability.of_scene(self.scene, model, self._features, self.fidelity.spacing)
+        return step, f"body {i}" if i < self._bodies else f"drive {i - self._bodies}"
 
     def _initial_rows(self) -> Array:
         """The scene's state as rows [movers] of MOVING."""
@@ -189,11 +205,11 @@ class World:
     def _raise_diverged(self, h: float) -> None:
         worlds = np.flatnonzero(self._state.world["diverged"]).tolist()
         world = worlds[0]
-        step, body = stability.of_scene(self.scene, self._model, self.fidelity.spacing)
-        if h > step:
+        step, mover = self._safe_step(self._model)
+        if h > step and self._given_stiffness():
             cause = (
                 f"the substep of {h:g} s is longer than the largest safe one, {step:.3g} s, which "
-                f"body {body} sets"
+                f"{mover} sets"
             )
         else:
             cause = "a state, speed or force too large for double precision"

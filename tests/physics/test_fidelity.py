@@ -8,7 +8,7 @@ import pytest
 from physics import PRESETS, Fidelity
 from physics.fidelity import resolve
 
-LIMITS = {"contact_resolution": 1.0, "spacing": 1.0, "rounding": 0.5, "skin": 1.0}
+LIMITS = {"contact_resolution": 0.7, "spacing": 1.0, "rounding": 0.5, "skin": 1.0}
 
 
 def test_presets_grow_finer():

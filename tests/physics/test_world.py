@@ -116,8 +116,40 @@ def test_a_stiffness_that_the_step_cannot_carry_is_refused_with_the_largest_safe
 
 
 def test_without_a_stiffness_no_step_is_too_long():
-    for step in (1e-5, 1e-3, 0.1):
-        World(scenes.push_like(), Fidelity(substep=step, contact_resolution=1.0))
+    for step in (1e-5, 1e-3, 4e-3):
+        fidelity = Fidelity(substep=step, contact_resolution=0.7)
+        world = settled(scenes.block_on_ground(), fidelity, time=1000 * step)
+        assert world.largest_stable_step() > step
+        height = world.position[0, 0, 2]
+        world.advance(step)
+        assert world.position[0, 0, 2] == pytest.approx(height, abs=1e-12)
+
+
+def test_a_servo_that_the_step_cannot_carry_is_refused():
+    scene = Scene([], drives=[Drive(BALL, 0.1, 5.0, frequency=900.0)])
+    with pytest.raises(
+        ValueError, match=r"Drive\.frequency 900 .* drive 0 .*safe step is (\S+) s"
+    ) as e:
+        World(scene)
+    safe = float(str(e.value).split("largest safe step is ")[1].split()[0].rstrip(";"))
+    World(scene, Fidelity(substep=0.99 * safe))
+    for ratio, lasts in ((0.95, True), (1.05, False)):
+        fidelity = Fidelity(substep=ratio * safe)
+        world = World(scene, fidelity, allow_unstable=True)
+        world.set_state(drive_velocity=(1e-9, 0.0, 0.0))
+        for _ in range(200):
+            world.advance(fidelity.substep)
+        assert (np.abs(world.drive_velocity).max() < 1e-9) == lasts
+
+
+def test_a_tower_that_chatters_is_beyond_its_largest_stable_step():
+    """Corners alone make a box's face stiffer against rocking: too stiff for two at this step."""
+    corners = Fidelity(substep=4e-3, spacing=1.0)
+    still = settled(scenes.tower(2), "fast", time=5.0)
+    assert still.largest_stable_step() > 4e-3
+    assert still.kinetic_energy()[0] < 1e-15
+    chattering = settled(scenes.tower(2), corners, time=5.0)
+    assert chattering.largest_stable_step() < 4e-3
 
 
 # --- reading ------------------------------------------------------------------------------------
