@@ -138,7 +138,8 @@ def make_advance(features: Features):
         failed = 0
         for w in range(first * LANES, min(last * LANES, chosen.shape[0])):
             status = state.world[w]
-            failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
+            if chosen[w] and (status.diverged != 0 or status.overflow != 0):
+                failed += 1
         return failed
 
     return advance

@@ -8,6 +8,7 @@ import numpy as np
 from physics.features import Features
 from physics.group import Work, load
 from physics.jit import LANES, SOURCES, entry
+from physics.landing import point_jacobian
 from physics.model import Model
 from physics.rotation import rotation_matrix
 from physics.shapes import PLANE
@@ -101,6 +102,7 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
     place = np.arange(len(side)) - model.side["first_slot"][side]
     overlap = rows["overlap"][:, world % LANES]
     touching = (place < state.side["count"][world, side]) & (overlap > 0.0)
+    touching &= state.world["diverged"][world] == 0
     return side[touching], np.flatnonzero(touching)
 
 
@@ -182,14 +184,6 @@ def contact_shares(
         before = shares.get(int(k), (0.0, 0.0))
         shares[int(k)] = (before[0] + weight * along, before[1] + weight * across)
     return shares
-
-
-def point_jacobian(arm: Array) -> Array:
-    """[3, 6]: how a point at `arm` [3] m from the centre moves with displacement and rotation."""
-    x, y, z = arm
-    return np.array(
-        [[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]]
-    )
 
 
 def inverse_masses(model: Model, state: State, world: int) -> Array:

@@ -46,7 +46,8 @@ class Fidelity:
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
         choice("Fidelity.damping", self.damping, DAMPINGS)
         object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
-        integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
+        together = integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
+        object.__setattr__(self, "collision_substeps", together)
         limits = {
             "contact_resolution": (1e-4, 0.7),
             "spacing": (0.01, 1.0),

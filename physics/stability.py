@@ -20,9 +20,9 @@ import numpy as np
 
 from physics import diagnostics
 from physics.features import Features
+from physics.landing import landings
 from physics.model import Model
 from physics.scene import Body, Drive, Scene
-from physics.shapes import Shape
 from physics.state import State
 
 Array = np.ndarray
@@ -100,23 +100,6 @@ def of_servo(mover: Any) -> float:
     return _root(lambda h: _servo(mover, h) * float(mover["inverse_mass"]))
 
 
-def _landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
-    """Shares [6, 6] along and across the normal of a body that lies on each of its sides."""
-    positions, weights, radius = shape.samples(spacing, 0.0)
-    found = []
-    for normal in (*np.eye(3), *-np.eye(3)):
-        height = positions @ normal
-        lowest = height <= height.min() + 1e-9
-        along, across = np.zeros((6, 6)), np.zeros((6, 6))
-        for position, weight in zip(positions[lowest], weights[lowest], strict=True):
-            jacobian = diagnostics.point_jacobian(position - radius * normal)
-            pressed = jacobian.T @ np.outer(normal, normal) @ jacobian
-            along += weight * pressed
-            across += weight * (jacobian.T @ jacobian - pressed)
-        found.append((along, across))
-    return found
-
-
 def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> tuple[float, int]:
     """A safe step in s for any state of a scene, and the index of the mover that binds it.
 
@@ -126,7 +109,7 @@ def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> 
     if not movers:
         return math.inf, 0
     steps = [
-        _of_mover(model, features, i, _landings(mover.shape, spacing * mover.shape.width))
+        _of_mover(model, features, i, landings(mover.shape, spacing * mover.shape.width))
         for i, mover in enumerate(movers)
     ]
     binding = int(np.argmin(steps))
@@ -134,7 +117,7 @@ def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> 
 
 
 def _of_mover(
-    model: Model, features: Features, i: int, landings: list[tuple[Array, Array]]
+    model: Model, features: Features, i: int, sides_of: list[tuple[Array, Array]]
 ) -> float:
     """A safe step in s for mover i in any company.
 
@@ -158,7 +141,7 @@ def _of_mover(
                 share *= 1.0 + model.mover[other]["inverse_mass"] / row["inverse_mass"]
             normal = share * sum(_normal(side, features.dashpot, h) for side in sides)
             shear = share * sum(_across(side, h) for side in sides)
-            each.append(max(_largest(inverse, normal * n + shear * t) for n, t in landings))
+            each.append(max(_largest(inverse, normal * n + shear * t) for n, t in sides_of))
         return float(sum(sorted(each)[-_PARTNERS:]) + _servo(row, h) * row["inverse_mass"])
 
     return _root(load)

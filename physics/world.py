@@ -194,16 +194,16 @@ class World:
             # a world that diverged before isn't written, nor one that isn't advanced
             self._rows_valid = self._rows_valid or bool(worlds.all())
             return
-        if state.world["diverged"].any():
-            self._raise_diverged(h)
-        full = np.flatnonzero(state.world["overflow"]).tolist()
+        diverged = np.flatnonzero((state.world["diverged"] != 0) & worlds).tolist()
+        if diverged:
+            self._raise_diverged(h, diverged)
+        full = np.flatnonzero((state.world["overflow"] != 0) & worlds).tolist()
         raise ContactOverflow(
             f"worlds {full}: two bodies have more than eight touching particle pairs a "
             "particle; they overlap deeply, or Fidelity.skin is too wide"
         )
 
-    def _raise_diverged(self, h: float) -> None:
-        worlds = np.flatnonzero(self._state.world["diverged"]).tolist()
+    def _raise_diverged(self, h: float, worlds: list[int]) -> None:
         world = worlds[0]
         step, mover = self._safe_step(self._model)
         if h > step and self._given_stiffness():
@@ -373,7 +373,7 @@ class World:
     def _mask(self, worlds: Any) -> Array:
         if worlds is None:
             return self._everyone
-        mask = np.asarray(worlds)
+        mask = np.ascontiguousarray(worlds)
         if mask.dtype != bool or mask.shape != (self.count,):
             raise ValueError(
                 f"worlds must be a mask of bools of shape ({self.count},), got {mask.dtype} of "

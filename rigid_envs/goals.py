@@ -1,11 +1,12 @@
 """Distance of goals, and what of a row lies within its bounds: one pass over all worlds."""
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from physics.jit import entry, kernel
+from physics.jit import SOURCES, entry, kernel
 
 Array = np.ndarray
 
@@ -20,27 +21,41 @@ def _apart(a, b, first, n, i):
     return math.sqrt(total)
 
 
-@entry
-def _distances(a, b, out):
-    for i in range(out.shape[0]):
-        out[i] = _apart(a, b, 0, a.shape[1], i)
+@cache
+def _make_distances() -> Any:
+    sources = SOURCES
+
+    @entry
+    def distances(a, b, out):
+        _ = sources
+        for i in range(out.shape[0]):
+            out[i] = _apart(a, b, 0, a.shape[1], i)
+
+    return distances
 
 
-@entry
-def _judge(values, low, high, goals, apart, outside):
-    split = values.shape[1] - goals.shape[1]
-    for i in range(values.shape[0]):
-        beyond = False
-        for c in range(values.shape[1]):
-            x = values[i, c]
-            if x < low[c]:
-                values[i, c] = low[c]
-                beyond = True
-            elif x > high[c]:
-                values[i, c] = high[c]
-                beyond = True
-        outside[i] = beyond
-        apart[i] = _apart(values, goals, split, goals.shape[1], i)
+@cache
+def _make_judge() -> Any:
+    sources = SOURCES
+
+    @entry
+    def judge(values, low, high, goals, apart, outside):
+        _ = sources
+        split = values.shape[1] - goals.shape[1]
+        for i in range(values.shape[0]):
+            beyond = False
+            for c in range(values.shape[1]):
+                x = values[i, c]
+                if x < low[c]:
+                    values[i, c] = low[c]
+                    beyond = True
+                elif x > high[c]:
+                    values[i, c] = high[c]
+                    beyond = True
+            outside[i] = beyond
+            apart[i] = _apart(values, goals, split, goals.shape[1], i)
+
+    return judge
 
 
 def distance(a: Any, b: Any) -> Any:
@@ -53,7 +68,7 @@ def distance(a: Any, b: Any) -> Any:
     if a.ndim != 2:
         flat_a, flat_b = flat_a.reshape(-1, a.shape[-1]), flat_b.reshape(-1, a.shape[-1])
     out = np.empty(len(flat_a))
-    _distances(flat_a, flat_b, out)
+    _make_distances()(flat_a, flat_b, out)
     return out if a.ndim == 2 else out.reshape(a.shape[:-1])[()]
 
 
@@ -70,5 +85,5 @@ def judge(values: Array, low: Array, high: Array, goals: Array) -> tuple[Array, 
         distance [n] m of the goal that ends a row and the one wanted; whether [n] it was clipped.
     """
     apart, outside = np.empty(len(values)), np.empty(len(values), dtype=bool)
-    _judge(values, low, high, goals, apart, outside)
+    _make_judge()(values, low, high, goals, apart, outside)
     return apart, outside

@@ -44,7 +44,7 @@ def make_loop(features, kind, report):
     surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
 
     @kernel
-    def loop(slots, candidate, seen, constants, h, rows):
+    def loop(slots, candidate, seen, active, constants, h, rows):
         R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
         force, torque, pressed = seen.force, seen.torque, seen.pressed
         radius, owner_radius = constants.radius, constants.owner_radius
@@ -52,8 +52,8 @@ def make_loop(features, kind, report):
         k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
         shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
         mu, inverse_mass = constants.friction, 1.0 / constants.pair_mass
-        lasts, sharp = h > 0.0, constants.sharp != 0
-        mass_rate = constants.pair_mass / h if lasts else 0.0
+        sharp = constants.sharp != 0
+        mass_rate = constants.pair_mass / h if h > 0.0 else 0.0
         for n in range(slots):
             row = candidate[n]
             sample, weights, memories, loads = row.sample, row.weight, row.impact_speed, row.load
@@ -102,7 +102,8 @@ def make_loop(features, kind, report):
                 normal = normal if weight > 0.0 else 0.0
                 memory = memory if weight > 0.0 else 0.0
                 load = load if weight > 0.0 else 0.0
-                # a step of no length is a look, and not remembered
+                # a step of no length is a look, and a lane at rest has no step: neither is kept
+                lasts = (h > 0.0) & (active[i] != 0)
                 memories[i] = memory if lasts else memories[i]
                 loads[i] = load if lasts else loads[i]
                 if box:
@@ -143,9 +144,9 @@ def make_loop(features, kind, report):
                     row.slid[i] = slid if lasts else row.slid[i]
                     row.shear[0, i] = sx if lasts else row.shear[0, i]
                     row.shear[1, i] = sy if lasts else row.shear[1, i]
-                fx *= weight
-                fy *= weight
-                fz *= weight
+                fx = fx * weight if weight > 0.0 else 0.0
+                fy = fy * weight if weight > 0.0 else 0.0
+                fz = fz * weight if weight > 0.0 else 0.0
                 force[0, i] += fx
                 force[1, i] += fy
                 force[2, i] += fz
@@ -185,7 +186,7 @@ def make_side(features, report):
     @stage
     def side(model, state, work, rows, g, k, h):
         constants, meeting = model.side[k], work.side[k]
-        kind, slots = constants.kind, meeting.slots
+        kind, slots, active = constants.kind, meeting.slots, work.lane[0].active
         owner, surface = work.solid[constants.owner], work.solid[constants.surface]
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
@@ -194,18 +195,18 @@ def make_side(features, report):
         for i in range(LANES):
             seen.pressed[i] = 0.0
         if plane and kind == PLANE:
-            plane_loop(slots, candidate, owner, constants, h, out)
+            plane_loop(slots, candidate, owner, active, constants, h, out)
         if others and kind != PLANE:
             relative_pose(owner, surface, seen)
             relative_motion(owner, surface, seen)
             if sphere and kind == SPHERE:
-                sphere_loop(slots, candidate, seen, constants, h, out)
+                sphere_loop(slots, candidate, seen, active, constants, h, out)
             if box and kind == BOX:
-                box_loop(slots, candidate, seen, constants, h, out)
+                box_loop(slots, candidate, seen, active, constants, h, out)
             if capsule and kind == CAPSULE:
-                capsule_loop(slots, candidate, seen, constants, h, out)
+                capsule_loop(slots, candidate, seen, active, constants, h, out)
             if particles and kind == PARTICLES:
-                particle_loop(slots, candidate, seen, constants, h, out)
+                particle_loop(slots, candidate, seen, active, constants, h, out)
             add_wrenches(owner, surface, seen)
 
     return side
@@ -242,7 +243,7 @@ def make_contacts(features):
 
     @stage
     def contacts(model, state, work, g, h, elapsed):
-        start = work.lane[0].start
+        start, stale = work.lane[0].start, work.lane[0].stale
         for k in range(model.side.shape[0]):
             meeting = work.side[k]
             if meeting.slots > 0:
@@ -254,6 +255,8 @@ def make_contacts(features):
                 for i in range(LANES):
                     time = start[i] + elapsed
                     before = (pressed[i] <= 0.0) | (first[i] <= time)
+                    # a look is only meant for states that were set
+                    before = before | ((h == 0.0) & (stale[i] == 0))
                     first[i] = first[i] if before else time
 
     return contacts

@@ -74,10 +74,12 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, slid):
     fx = -k * sx - c * ux
     fy = -k * sy - c * uy
     fz = -k * sz - c * uz
-    size = math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
+    inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
-    trial = size + (limit - mu * slid if slid > 0.0 else 0.0)
-    cut = min(max(trial, 0.0), limit) / size
+    # no more than as much damping again: a normal force that leaps must not turn the slip round
+    more = min(limit - mu * slid, -c * (fx * ux + fy * uy + fz * uz) * inverse)
+    trial = (fx * fx + fy * fy + fz * fz) * inverse + (more if slid > 0.0 else 0.0)
+    cut = min(max(trial, 0.0), limit) * inverse
     fx *= cut
     fy *= cut
     fz *= cut

@@ -93,10 +93,11 @@ def make_kinematics(features):
                 v[0, i] = inverse_mass * P[0, i]
                 v[1, i] = inverse_mass * P[1, i]
                 v[2, i] = inverse_mass * P[2, i]
+            for i in range(LANES):
+                place(solid, i)  # a drive's too: it never turns, but may stand askew
             if not constants.turns:
                 continue
             for i in range(LANES):
-                place(solid, i)
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
                 if rotation == NO_ROTATION:
                     ox, oy, oz = 0.0, 0.0, 0.0

@@ -101,7 +101,7 @@ def test_an_edit_of_any_file_changes_the_key_of_the_cache(name, tmp_path, monkey
 def test_every_entry_point_carries_the_key_of_the_cache():
     """Numba looks at the values in an entry's closure, and the hash of all sources is one."""
     found = 0
-    for path in PACKAGE.rglob("*.py"):
+    for path in [*PACKAGE.rglob("*.py"), *(ROOT / "rigid_envs").rglob("*.py")]:
         source = path.read_text()
         entries = source.count("@entry\n")
         assert source.count("sources = SOURCES\n") == source.count("_ = sources\n") == entries, path

@@ -536,6 +536,50 @@ def test_without_a_contact_no_step_is_too_long():
     assert world.largest_stable_step() == math.inf
 
 
+# --- advancing some ------------------------------------------------------------------------------
+
+
+def test_worlds_outside_the_mask_stay_as_they_are():
+    world = thrown(11)
+    world.advance(0.3)
+    before = digests(world)
+    time = world.time.copy()
+    rows = world.read().rows
+    mask = np.zeros(11, dtype=bool)
+    mask[[0, 3, 9]] = True
+    world.advance(0.1, mask)
+    after = digests(world)
+    assert [a == b for a, b in zip(before, after, strict=True)] == (~mask).tolist()
+    np.testing.assert_array_equal(world.time, np.where(mask, time + 0.1, time))
+    np.testing.assert_array_equal(world.read().rows[~mask], rows[~mask])
+    # and go on as if nothing had been
+    twin = thrown(11)
+    twin.advance(0.3)
+    world.advance(0.1, ~mask)
+    twin.advance(0.1)
+    assert digests(world) == digests(twin)
+
+
+def test_a_cube_that_is_paused_on_an_incline_does_not_creep():
+    scene = scenes.block_on_ground(angle=0.3)
+    world = settled(scene, count=2)
+    start = world.position[0, 0].copy()
+    for _ in range(20):
+        world.advance(0.1, np.array([False, True]))
+        world.advance(0.02)
+    assert np.abs(world.position[0, 0] - start).max() < 1e-9
+
+
+@pytest.mark.parametrize("layout", [lambda m: np.repeat(m, 2)[::2], lambda m: m[::-1][::-1]])
+def test_a_mask_of_any_layout_chooses_the_same(layout):
+    mask = np.arange(20) % 3 == 0
+    world, twin = thrown(20), thrown(20)
+    world.advance(0.02, layout(mask))
+    twin.advance(0.02, mask)
+    np.testing.assert_array_equal(world.time > 0.0, mask)
+    assert digests(world) == digests(twin)
+
+
 # --- divergence ---------------------------------------------------------------------------------
 
 
