@@ -77,7 +77,8 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, slid):
     inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
     # no more than as much damping again: a normal force that leaps must not turn the slip round
-    more = min(limit - mu * slid, -c * (fx * ux + fy * uy + fz * uz) * inverse)
+    against = max(0.0, -(fx * ux + fy * uy + fz * uz) * inverse)
+    more = min(limit - mu * slid, c * against)
     trial = (fx * fx + fy * fy + fz * fz) * inverse + (more if slid > 0.0 else 0.0)
     cut = min(max(trial, 0.0), limit) * inverse
     fx *= cut
