@@ -9,12 +9,12 @@ import math
 from functools import cache
 
 from physics.features import Features
-from physics.group import load, load_forces, store
+from physics.group import load, store
 from physics.jit import LANES, SOURCES, entry, kernel, stage
-from physics.pipeline import make_forces, make_substep
+from physics.pipeline import make_substep
 from physics.readout import make_write_rows
-from physics.stages.candidates import make_collision_step, make_side_search
-from physics.stages.kinematics import make_kinematics, place_statics
+from physics.stages.candidates import make_forget
+from physics.stages.kinematics import place_statics
 
 # m, kg m/s or kg m^2/s in sum: beyond it a mover counts as diverged
 LARGEST = 1e50
@@ -23,34 +23,6 @@ LARGEST = 1e50
 def cut(span: float, longest: float) -> int:
     """Number of equal substeps no longer than `longest` s that make up `span` s."""
     return max(1, math.ceil(span / longest * (1.0 - 1e-12)))
-
-
-@cache
-def make_refresh(features: Features):
-    """Kernel that brings candidates and forces up to states that were set from outside.
-
-    Lanes whose state wasn't set stay as they are: no contact remembers a step of no length.
-    """
-    kinematics = make_kinematics(features)
-    side_search = make_side_search(features)
-    forces = make_forces(features)
-
-    @stage
-    def refresh(model, state, work, g):
-        lane = work.lane[0]
-        kinematics(model, work)
-        for k in range(model.side.shape[0]):
-            for i in range(LANES):
-                if lane.stale[i]:
-                    work.side[k].travel[i] = -1.0
-            side_search(model, state, work, g, k, 0.0, False)
-        forces(model, state, work, g, 0.0, 0.0)
-        for m in range(model.mover.shape[0]):
-            for i in range(LANES):
-                if lane.active[i] and not lane.stale[i]:
-                    load_forces(state, work, g, m, i)
-
-    return refresh
 
 
 @kernel
@@ -103,8 +75,7 @@ def make_advance(features: Features):
     bit whatever runs beside it, and however groups are shared out over threads.
     """
     sources = SOURCES
-    refresh = make_refresh(features)
-    collision_step = make_collision_step(features)
+    forget = make_forget(features)
     substep = make_substep(features)
     write_back = make_write_back(features)
 
@@ -124,17 +95,22 @@ def make_advance(features: Features):
             for i in range(LANES):
                 if lane.active[i]:
                     state.world[g * LANES + i].overflow = 0
-            if stale > 0:
-                refresh(model, state, work, g)
+            # states that were set from outside have no forces yet: a look comes before their first
+            # step. Forces have one place in the code; kernels grow too long for LLVM otherwise
+            look = stale > 0
+            if look:
+                forget(model, state, work, g)
             done = 0
             while True:
-                for _s in range(min(collision_substeps, substeps - done)):
-                    done += 1
-                    substep(model, state, work, g, h, done * h)
+                together = min(collision_substeps, substeps - done)
+                opens = done > 0
+                for _s in range(together + (1 if look else 0)):
+                    done += 0 if look else 1
+                    substep(model, state, work, g, h, done * h, opens, look)
+                    opens, look = False, False
                 write_back(model, state, work, rows, g, done * h, done == substeps)
                 if done == substeps:
                     break
-                collision_step(model, state, work, g)
         failed = 0
         for w in range(first * LANES, min(last * LANES, chosen.shape[0])):
             status = state.world[w]

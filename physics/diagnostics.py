@@ -14,6 +14,7 @@ from physics.rotation import rotation_matrix
 from physics.shapes import PLANE
 from physics.stages.contacts import REPORT, make_side
 from physics.stages.kinematics import make_kinematics, place_statics
+from physics.stages.points import make_points
 from physics.state import State
 
 Array = np.ndarray
@@ -64,7 +65,8 @@ def _make_report(features: Features) -> Any:
     """Entry point that evaluates every candidate of a group of worlds at its present state."""
     sources = SOURCES
     kinematics = make_kinematics(features)
-    side = make_side(features, True)
+    impulse = features.impulse
+    side = make_points(features) if impulse else make_side(features, True)
 
     @entry
     def report(model, state, work, chosen, rows):
@@ -74,13 +76,21 @@ def _make_report(features: Features) -> Any:
         kinematics(model, work)
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
-                side(model, state, work, rows, 0, k, 0.0)
+                if impulse:
+                    # the impulse of one second is the force
+                    side(model, state, work, 0, k, work.lane[0].keeps, 1.0)
+                else:
+                    side(model, state, work, rows, 0, k, 0.0)
 
     return report
 
 
 def _rows_of_group(model: Model, features: Features, state: State, group: int) -> Array:
-    """[slots] of REPORT, every slot of a group, by the kernels of the step."""
+    """[slots] of REPORT, every slot of a group, by the kernels of the step.
+
+    Vectors are in the frame of the side's surface; of the impulse law in the world's, and points
+    relative to the owner.
+    """
     worlds = slice(group * LANES, (group + 1) * LANES)
     alone = slice(group, group + 1)
     copied = State(
@@ -92,7 +102,12 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
     everyone = np.ones(len(copied.world), dtype=bool)
-    _make_report(features)(model, copied, Work.of(model), everyone, rows)
+    work = Work.of(model, features)
+    _make_report(features)(model, copied, work, everyone, rows)
+    if features.impulse:
+        rows["overlap"], rows["weight"] = -work.point["gap"], work.point["weight"]
+        rows["point"], rows["normal"] = work.point["arm"], work.point["normal"]
+        rows["force"] = work.point["pull"] + work.point["push"][:, None] * work.point["normal"]
     return rows
 
 
@@ -111,21 +126,23 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
     rows, lane = _rows_of_group(model, features, state, world // LANES), world % LANES
     side, slot = _touching(model, state, world, rows)
 
-    # rows come in the frame of the side's surface; a plane's is the world's
     statics, mover = model.static, state.mover[world]
     centers = np.concatenate([mover["position"], statics[:, :3]])
     turns = rotation_matrix(np.concatenate([mover["orientation"], statics[:, 3:]]))
     surface = model.side["surface"][side]
-    plane = (model.side["kind"][side] == PLANE)[:, None]
+    in_place = features.impulse | (model.side["kind"][side] == PLANE)[:, None]  # a plane is too
+    origin = centers[model.side["owner"][side]] if features.impulse else centers[surface]
+    if not features.impulse:
+        origin = np.where(in_place, 0.0, origin)
 
     def in_world(name: str) -> Array:
         vectors = rows[name][slot, :, lane]
-        return np.where(plane, vectors, np.einsum("nij,nj->ni", turns[surface], vectors))
+        return np.where(in_place, vectors, np.einsum("nij,nj->ni", turns[surface], vectors))
 
     return Report(
         side=side,
         overlap=rows["overlap"][slot, lane],
-        point=in_world("point") + np.where(plane, 0.0, centers[surface]),
+        point=in_world("point") + origin,
         normal=in_world("normal"),
         force=in_world("force"),
         weight=rows["weight"][slot, lane],

@@ -13,6 +13,8 @@ class Features(NamedTuple):
     """Compile-time switches; each absent one is absent from the machine code and the state.
 
     Attributes:
+        impulse: the impulse law in place of the spring law.
+        restitution: of the impulse law: any pair bounces.
         dashpot: linear damping in place of the one continuous in overlap.
         friction: any pair has friction: tangential law and history.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
@@ -20,6 +22,8 @@ class Features(NamedTuple):
         drives: there are driven tools.
     """
 
+    impulse: bool
+    restitution: bool
     dashpot: bool
     friction: bool
     rotation: int

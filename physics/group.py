@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.features import Features
 from physics.jit import LANES, kernel, stage
 from physics.model import Model
 from physics.state import aligned_zeros
@@ -54,18 +55,66 @@ REMEMBERED = np.dtype(
         ("impact_speed", "f8"),
         ("load", "f8"),
         ("shear", "f8", (3,)),
+        ("pull", "f8", (3,)),
         ("slid", "f8"),
         ("face", "f8"),
     ],
     align=True,
 )
 
+# one row a candidate of a pair of sides, while four of them are chosen
+NEAR = np.dtype(
+    [
+        ("position", "f8", (3,)),  # m, in the world, as the others
+        ("normal", "f8", (3,)),  # out of the surface of the pair's first side
+        ("gap", "f8"),  # m
+        ("group", "i8"),  # 1: touches with the same face as the nearest
+        ("chosen", "i8"),
+    ],
+    align=True,
+)
+
+# one row a slot
+POINT = np.dtype(
+    [
+        ("normal", "f8", (3, LANES)),  # out of the surface
+        ("arm", "f8", (3, LANES)),  # m, from the owner's centre
+        ("surface_arm", "f8", (3, LANES)),  # m, from the surface's centre
+        ("gap", "f8", (LANES,)),  # m, negative if they overlap
+        ("weight", "f8", (LANES,)),
+        ("mass", "f8", (LANES,)),  # kg that an impulse along the normal feels
+        ("shear_mass", "f8", (LANES,)),  # kg, the least that one across it feels
+        ("push", "f8", (LANES,)),  # N s along the normal
+        ("pull", "f8", (3, LANES)),  # N s across it
+        ("anchor", "f8", (3, LANES)),  # m, how far the point has left where it came to stick
+        ("spent", "f8", (3, LANES)),  # N s given in this step beyond push and pull
+        ("bounce", "f8", (LANES,)),  # restitution of an instantaneous collision, 0 if none
+        ("hit", "f8", (LANES,)),  # N s along the normal, of that collision
+        ("skid", "f8", (3, LANES)),  # N s across it, likewise
+    ],
+    align=True,
+)
+
+# one row a solid
+TENSOR = np.dtype([("entry", "f8", (6, LANES))], align=True)  # 1/(kg m^2): xx yy zz xy xz yz
+
+
 # one row in all
 LANE = np.dtype(
     [
         ("active", "i8", (LANES,)),  # 0: no world, or one that has diverged or isn't advanced
         ("stale", "i8", (LANES,)),
+        ("keeps", "i8", (LANES,)),  # 1: contacts remember this step
         ("start", "f8", (LANES,)),  # s, time at which this call began
+        # of instantaneous collisions, see stages/impacts.py
+        ("struck", "i8", (LANES,)),
+        ("going", "i8", (LANES,)),  # 1: rounds aren't over
+        ("speed", "f8", (LANES,)),  # m/s, fastest approach
+        ("change", "f8", (LANES,)),  # m/s, largest of a round
+        ("share", "f8", (LANES,)),  # of restitution that the energy allows
+        ("before", "f8", (LANES,)),  # J, kinetic energy
+        ("pressed", "f8", (LANES,)),  # J, after compression
+        ("parted", "f8", (LANES,)),  # J, after restitution
     ],
     align=True,
 )
@@ -76,10 +125,14 @@ class Work(NamedTuple):
 
     Attributes:
         solid: [solids] of SOLID.
-        relative: [1] of SOLID: the owner of a side, in the frame of the surface that it meets.
+        relative: [2] of SOLID: the owner of a side, in the frame of the surface that it meets;
+            and while a pair is searched, the other way round.
         side: [sides] of MEETING.
         lane: [1] of LANE.
         old: [longest list of candidates] of REMEMBERED.
+        tensor: [solids] of TENSOR, inverse inertia in the world frame; of the impulse law.
+        point: [slots] of POINT, likewise.
+        near: [two longest lists] of NEAR, likewise.
     """
 
     solid: Array
@@ -87,17 +140,25 @@ class Work(NamedTuple):
     side: Array
     lane: Array
     old: Array
+    tensor: Array
+    point: Array
+    near: Array
 
     @classmethod
-    def of(cls, model: Model) -> "Work":
+    def of(cls, model: Model, features: Features) -> "Work":
         """Working arrays for a model."""
         longest = int(model.side["slot_count"].max(initial=0))
+        solids = len(model.mover) + len(model.static)
+        slots = int(model.side["slot_count"].sum())
         return cls(
-            solid=aligned_zeros(len(model.mover) + len(model.static), SOLID),
-            relative=aligned_zeros(1, SOLID),
+            solid=aligned_zeros(solids, SOLID),
+            relative=aligned_zeros(2, SOLID),
             side=aligned_zeros(len(model.side), MEETING),
             lane=aligned_zeros(1, LANE),
             old=np.zeros(longest, REMEMBERED),
+            tensor=aligned_zeros(solids if features.impulse else 0, TENSOR),
+            point=aligned_zeros(slots if features.impulse else 0, POINT),
+            near=np.zeros(2 * longest if features.impulse else 0, NEAR),
         )
 
 
@@ -128,6 +189,7 @@ def load(model, state, work, chosen, g):
         w = g * LANES + i
         active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
         lane.active[i] = 1 if active else 0
+        lane.keeps[i] = 1 if active else 0
         lane.stale[i] = 1 if active and state.world[w].stale != 0 else 0
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.mover.shape[0]):
@@ -168,6 +230,27 @@ def load(model, state, work, chosen, g):
                 side.first_touch[i] = 0.0
     for k in range(model.side.shape[0]):
         count_slots(work, k)
+
+
+@stage
+def note_touch(work, k, pressed, elapsed):
+    """Notes in which lanes a side touches for the first time; `pressed` [N or N s] tells if."""
+    first, start, keeps = work.side[k].first_touch, work.lane[0].start, work.lane[0].keeps
+    for i in range(LANES):
+        time = start[i] + elapsed
+        before = (pressed[i] <= 0.0) | (first[i] <= time) | (keeps[i] == 0)
+        first[i] = first[i] if before else time
+
+
+@stage
+def end_look(model, state, work, g):
+    """Gives lanes whose state wasn't set their forces back, and lets them remember again."""
+    lane = work.lane[0]
+    for i in range(LANES):
+        lane.keeps[i] = lane.active[i]
+        if lane.active[i] and not lane.stale[i]:
+            for m in range(model.mover.shape[0]):
+                load_forces(state, work, g, m, i)
 
 
 @kernel

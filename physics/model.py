@@ -22,6 +22,9 @@ Array = np.ndarray
 # How much faster a cube rocks on its face than it bobs, in stiffness by mass. A plate rocks twice
 # as fast again, and would outrun the step: its contacts are that much softer
 _CUBE = 9.0 / 8.0
+# of the impulse law: the damping ratio of a soft contact, and the steps of free fall whose speed
+# counts as rest
+SOFT_DAMPING, REST_STEPS = 1.0, 4.0
 Solid = Body | Drive | Static | Ground
 
 
@@ -47,6 +50,7 @@ SIDE = np.dtype(
         ("owner", "i8"),  # solid that carries the samples
         ("surface", "i8"),  # solid whose surface they meet
         ("kind", "i8"),  # of that surface
+        ("mirror", "i8"),  # the side of the same pair the other way round, or -1
         ("first_sample", "i8"),  # into Model.sample
         ("sample_count", "i8"),
         ("first_partner", "i8"),  # likewise, the particles of a particle surface
@@ -62,6 +66,7 @@ SIDE = np.dtype(
         ("skin", "f8"),  # m
         ("stiffness", "f8"),  # N/m of a whole face
         ("damping", "f8"),  # the law's coefficient
+        ("restitution", "f8"),
         ("rest_speed", "f8"),  # m/s, floor of the impact speed
         ("pair_mass", "f8"),  # kg, reduced mass
         ("shear_stiffness", "f8"),  # N/m
@@ -226,6 +231,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         samples.append(np.column_stack([some.positions, some.weights]))
         return first, len(some.weights)
 
+    ways = {(pair.owner, pair.other): k for k, pair in enumerate(sides)}
     for row, pair in zip(side, sides, strict=True):
         a, b = solids[pair.owner], solids[pair.other]
         friction, restitution, stiffness = _pair_material(a.material, b.material)
@@ -240,6 +246,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         )
         damping = damping_coefficient(restitution, fidelity.damping)
         row["owner"], row["surface"], row["kind"] = pair.owner, pair.other, pair.surface.kind
+        row["mirror"] = ways.get((pair.other, pair.owner), -1)
         row["first_sample"], row["sample_count"] = add(pair.samples)
         if pair.partners is not None:
             row["first_partner"], row["partner_count"] = add(pair.partners)
@@ -257,6 +264,10 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         row["stiffness"], row["pair_mass"], row["friction"] = stiffness, pair_mass, friction
         row["damping"] = damping
         row["rest_speed"] = rest_speed(damping, g, math.sqrt(stiffness / pair_mass))
+        row["restitution"] = restitution
+        if fidelity.law == "impulse":
+            row["damping"] = 2.0 * SOFT_DAMPING * math.sqrt(stiffness * pair_mass)
+            row["rest_speed"] = REST_STEPS * g * fidelity.substep
 
     poses = [
         (0.0, 0.0, 0.0, *NO_TURN) if isinstance(s, Ground) else (*s.position, *s.orientation)
@@ -276,6 +287,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
 
 def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
     """What of the engine this scene needs."""
+    impulse = fidelity.law == "impulse" and len(model.side) > 0
     kinds = set(model.side["kind"].tolist())
     friction = bool(np.any(model.side["friction"] > 0.0))
     # a ball without friction is never turned, and one that doesn't spin needs no orientation
@@ -284,7 +296,9 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
     isotropic = bool(np.all(moments == moments[:, :1]))
     rotation = NO_ROTATION if inert and not friction else ISOTROPIC if isotropic else GENERAL
     return Features(
-        dashpot=fidelity.damping == "dashpot" and len(model.side) > 0,
+        impulse=impulse,
+        restitution=impulse and bool(np.any(model.side["restitution"] > 0.0)),
+        dashpot=not impulse and fidelity.damping == "dashpot" and len(model.side) > 0,
         friction=friction,
         rotation=rotation,
         plane=PLANE in kinds,

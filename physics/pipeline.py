@@ -3,11 +3,13 @@
 from functools import cache
 
 from physics.features import Features
+from physics.group import end_look
 from physics.jit import stage
 from physics.stages.candidates import make_candidates
 from physics.stages.contacts import make_contacts
 from physics.stages.drives import make_drives
 from physics.stages.gravity import gravity
+from physics.stages.impulses import make_impulses
 from physics.stages.integrator import make_drift, make_kick
 from physics.stages.kinematics import make_kinematics
 
@@ -16,7 +18,7 @@ from physics.stages.kinematics import make_kinematics
 def make_forces(features: Features):
     """The forces at the present positions and half-step velocities, as the stages that add them."""
     drives = make_drives(features)
-    contacts = make_contacts(features)
+    contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
     @stage
     def forces(model, state, work, g, h, elapsed):
@@ -35,14 +37,21 @@ def make_substep(features: Features):
     kinematics = make_kinematics(features)
     candidates = make_candidates(features)
     forces = make_forces(features)
+    # A spring's force is there at a look; impulses are those of the half kick that comes first
+    glance = 0.5 if features.impulse else 0.0
 
     @stage
-    def substep(model, state, work, g, h, elapsed):
-        kick(model, work, 0.5 * h)
-        drift(model, work, h)
+    def substep(model, state, work, g, h, elapsed, opens, look):
+        """`opens` a collision step; a `look`: only forces, on states that were set from outside."""
+        if not look:
+            kick(model, work, 0.5 * h)
+            drift(model, work, h)
         kinematics(model, work)
-        candidates(model, state, work, g)
-        forces(model, state, work, g, h, elapsed)
-        kick(model, work, 0.5 * h)
+        candidates(model, state, work, g, opens)
+        forces(model, state, work, g, glance * h if look else h, elapsed)
+        if look:
+            end_look(model, state, work, g)
+        else:
+            kick(model, work, 0.5 * h)
 
     return substep

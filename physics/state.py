@@ -55,12 +55,16 @@ def candidate_dtype(features: Features) -> np.dtype:
         ("sample", "f8", (3, LANES)),  # m, in the owner's frame
         ("weight", "f8", (LANES,)),
         # what a contact remembers
-        ("impact_speed", "f8", (LANES,)),  # m/s, negative while separating, 0 while apart
         ("load", "f8", (LANES,)),  # N, what pressed it in the last step
     ]
+    if not features.impulse:
+        fields.append(("impact_speed", "f8", (LANES,)))  # m/s, see overlap_force
     if features.friction:
         fields.append(("shear", "f8", (3, LANES)))  # m
-        fields.append(("slid", "f8", (LANES,)))  # N, see friction_force
+        if features.impulse:
+            fields.append(("pull", "f8", (3, LANES)))  # N, of friction, in the surface's frame
+        else:
+            fields.append(("slid", "f8", (LANES,)))  # N, see friction_force
     if features.box:
         fields.append(("face", "f8", (LANES,)))  # by which it came into a box, see box_distance
     if features.particles:

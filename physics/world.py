@@ -185,7 +185,7 @@ class World:
             try:
                 work = idle.pop()
             except IndexError:  # as many as threads are made, once
-                work = Work.of(model)
+                work = Work.of(model, self._features)
             failed = kernel(model, state, work, rows, worlds, first, last, h, substeps, together)
             idle.append(work)
             return failed

@@ -23,7 +23,7 @@ class RigidEnv(gym.Env[Observation, Array]):
     Args:
         task: a task's name, or a task.
         reward_type: "sparse": -1 or 0; "dense": shaped.
-        fidelity: "fast", "balanced", "accurate" or a physics.Fidelity.
+        fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" or "human".
         show_forces: draw contact forces.
         max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.

@@ -27,7 +27,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         task: a task's name, or a task.
         num_envs: number of worlds.
         reward_type: "sparse": -1 or 0; "dense": shaped.
-        fidelity: "fast", "balanced", "accurate" or a physics.Fidelity.
+        fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" (a frame a world) or "human" (shows the first).
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.

@@ -13,28 +13,30 @@ from functools import cache
 from physics.group import count_slots
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
+from physics.stages.manifold import make_choose, note
 from physics.stages.relative import relative_pose
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
 
 
 @cache
 def make_search(features):
-    """Kernel that makes the list of candidates of one side anew, in one lane."""
-    friction = features.friction
+    """Kernels that make the list of candidates of one side anew, and clear a slot, in one lane."""
+    friction, impulse = features.friction, features.impulse
     sphere, box, capsule = features.sphere, features.box, features.capsule
     particles = features.particles
 
     @kernel
     def distance(side, x, y, z):
         kind, a, b, c = side.kind, side.core[0], side.core[1], side.core[2]
-        d = z
+        d, nx, ny, nz = z, 0.0, 0.0, 1.0
         if box and kind == BOX:
-            d = box_distance(x, y, z, a, b, c, 0.0, side.radius, side.sharp != 0)[0]
+            sharp = side.sharp != 0
+            d, nx, ny, nz, _ = box_distance(x, y, z, a, b, c, 0.0, side.radius, sharp)
         if sphere and kind == SPHERE:
-            d = sphere_distance(x, y, z, a, b, c)[0]
+            d, nx, ny, nz = sphere_distance(x, y, z, a, b, c)
         if capsule and kind == CAPSULE:
-            d = capsule_distance(x, y, z, a, b, c)[0]
-        return d
+            d, nx, ny, nz = capsule_distance(x, y, z, a, b, c)
+        return d, nx, ny, nz
 
     @kernel
     def keep(row, i, old, cursor, count, key, x, y, z, weight):
@@ -46,12 +48,16 @@ def make_search(features):
         row.sample[1, i] = y
         row.sample[2, i] = z
         row.weight[i] = weight
-        row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
         row.load[i] = old[cursor].load if known else 0.0
-        if friction:
+        if not impulse:
+            row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
+        if friction and not impulse:
             row.slid[i] = old[cursor].slid if known else 0.0
-            for axis in range(3):
+        for axis in range(3):
+            if friction:
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
+            if friction and impulse:
+                row.pull[axis, i] = old[cursor].pull[axis] if known else 0.0
         if box:
             row.face[i] = old[cursor].face if known else 0.0
         return cursor
@@ -60,12 +66,16 @@ def make_search(features):
     def remember(row, i, key, memory):
         """Notes what a candidate remembers."""
         memory.sample_id = key
-        memory.impact_speed = row.impact_speed[i]
         memory.load = row.load[i]
-        if friction:
+        if not impulse:
+            memory.impact_speed = row.impact_speed[i]
+        if friction and not impulse:
             memory.slid = row.slid[i]
-            for axis in range(3):
+        for axis in range(3):
+            if friction:
                 memory.shear[axis] = row.shear[axis, i]
+            if friction and impulse:
+                memory.pull[axis] = row.pull[axis, i]
         if box:
             memory.face = row.face[i]
 
@@ -73,22 +83,28 @@ def make_search(features):
     def clear(row, i):
         """Leaves a lane of a slot without a candidate."""
         row.weight[i] = 0.0
-        row.impact_speed[i] = 0.0
         row.load[i] = 0.0
+        if not impulse:
+            row.impact_speed[i] = 0.0
         if box:
             row.face[i] = 0.0
-        if friction:
+        if friction and not impulse:
             row.slid[i] = 0.0
         for axis in range(3):
             row.sample[axis, i] = 0.0
             if friction:
                 row.shear[axis, i] = 0.0
+            if friction and impulse:
+                row.pull[axis, i] = 0.0
             if particles:
                 row.partner[axis, i] = 0.0
 
     @kernel
-    def list_samples(model, state, work, g, k, i, seen, count):
-        """Fills the list from the samples; `count` entries of work.old are known from before."""
+    def list_samples(model, state, work, g, k, i, seen, count, near):
+        """Fills the list from the samples; `count` entries of work.old are known from before.
+
+        `near`: where work.near begins for this side.
+        """
         side, old = model.side[k], work.old
         first, room = side.first_slot, side.slot_count
         candidate = state.candidate[g, first : first + room]
@@ -123,8 +139,22 @@ def make_search(features):
                     elif gap < nearest:
                         nearest = gap
             else:
-                gap = distance(side, x, y, z) - radius
+                gap, nx, ny, nz = distance(side, x, y, z)
+                gap -= radius
                 if gap < skin:
+                    if impulse:
+                        note(
+                            work.near[near + n],
+                            work.solid[side.surface],
+                            i,
+                            x,
+                            y,
+                            z + height,
+                            nx,
+                            ny,
+                            nz,
+                            gap,
+                        )
                     cursor = keep(candidate[n], i, old, cursor, count, s, sx, sy, sz, weight)
                     ids[n, i] = s
                     n += 1
@@ -133,8 +163,8 @@ def make_search(features):
         return n, skin if n > 0 else nearest
 
     @kernel
-    def search(model, state, work, g, k, i, seen, lasting):
-        """`seen`: the owner in the frame of the surface. `lasting`: contacts keep their memory."""
+    def search(model, state, work, g, k, i, seen, near):
+        """`seen`: the owner in the frame of the surface. `near`: see `list_samples`."""
         side, meeting = model.side[k], work.side[k]
         first, before = side.first_slot, meeting.count[i]
         c = seen.position
@@ -147,51 +177,72 @@ def make_search(features):
         count = 0
         travel = gap
         if not gap > side.skin:
-            known = before if lasting else 0
-            for n in range(known):
+            for n in range(before):
                 key = state.sample_id[g, first + n, i]
                 remember(state.candidate[g, first + n], i, key, work.old[n])
-            count, travel = list_samples(model, state, work, g, k, i, seen, known)
-        # a state set from outside may follow one that had diverged, and left anything in a slot
-        for n in range(count, before if lasting else side.slot_count):
+            count, travel = list_samples(model, state, work, g, k, i, seen, before, near)
+        for n in range(count, before):
             clear(state.candidate[g, first + n], i)
         meeting.count[i] = count
         meeting.travel[i] = travel
 
-    return search
+    return search, clear
 
 
 @cache
 def make_side_search(features):
     """Kernel that searches a side in the lanes that need it."""
-    search = make_search(features)
+    search, clear = make_search(features)
+    choose = make_choose(features, clear)
+    impulse = features.impulse
+
+    @stage
+    def look(work, side, seen):
+        """Where a side's owner is, as seen from its surface; for a plane that is the world."""
+        if side.kind == PLANE:
+            return work.solid[side.owner]
+        relative_pose(work.solid[side.owner], work.solid[side.surface], seen)
+        return seen
 
     @kernel
-    def side_search(model, state, work, g, k, least, lasting):
-        """In the active lanes whose travel is below `least` [m] or the last drift's path."""
+    def side_search(model, state, work, g, k, least):
+        """In the active lanes whose travel is below `least` [m] or the last drift's path.
+
+        The impulse law chooses among the candidates of a pair, so both its sides are searched.
+        """
         side, meeting = model.side[k], work.side[k]
         owner, surface = work.solid[side.owner], work.solid[side.surface]
-        seen = owner if side.kind == PLANE else work.relative[0]
-        if side.kind != PLANE:
-            relative_pose(owner, surface, seen)
+        mirror = side.mirror if impulse else -1
+        seen = look(work, side, work.relative[0])
+        back = look(work, model.side[mirror], work.relative[1]) if mirror >= 0 else seen
         for i in range(LANES):
             path = owner.path[i] + surface.path[i]
             if work.lane[0].active[i] and meeting.travel[i] < max(least, path):
-                search(model, state, work, g, k, i, seen, lasting)
+                search(model, state, work, g, k, i, seen, 0)
+                if mirror >= 0:
+                    search(model, state, work, g, mirror, i, back, meeting.count[i])
+                if impulse:
+                    choose(model, state, work, g, k, i)
         count_slots(work, k)
+        if mirror >= 0:
+            count_slots(work, mirror)
 
     return side_search
 
 
 @cache
 def make_candidates(features):
-    """Stage that spends the allowance of the last drift and searches where it is used up."""
+    """Stage that spends the allowance of the last drift and searches where it is used up.
+
+    The first substep of a collision step makes anew what is half used up: `opens`.
+    """
     side_search = make_side_search(features)
 
     @stage
-    def candidates(model, state, work, g):
+    def candidates(model, state, work, g, opens):
         for k in range(model.side.shape[0]):
             side = model.side[k]
+            least = 0.5 * side.skin if opens else 0.0
             travel = work.side[k].travel
             first, second = work.solid[side.owner].path, work.solid[side.surface].path
             spent = 0
@@ -199,26 +250,31 @@ def make_candidates(features):
                 path = first[i] + second[i]
                 left = travel[i] - path
                 travel[i] = left
-                spent += 1 if left < path else 0
+                spent += 1 if left < max(path, least) else 0
             if spent > 0:
-                side_search(model, state, work, g, k, 0.0, True)
+                side_search(model, state, work, g, k, least)
 
     return candidates
 
 
 @cache
-def make_collision_step(features):
-    """What opens a collision step: every list that is half used up is made anew."""
-    side_search = make_side_search(features)
+def make_forget(features):
+    """Stage that clears what contacts remember in lanes that were set from outside."""
+    clear = make_search(features)[1]
 
     @stage
-    def collision_step(model, state, work, g):
+    def forget(model, state, work, g):
+        lane = work.lane[0]
         for k in range(model.side.shape[0]):
-            travel, least = work.side[k].travel, 0.5 * model.side[k].skin
-            spent = 0
+            side, meeting = model.side[k], work.side[k]
             for i in range(LANES):
-                spent += 1 if travel[i] < least else 0
-            if spent > 0:
-                side_search(model, state, work, g, k, least, True)
+                if lane.stale[i]:
+                    # such a state may follow one that had diverged, and left anything in a slot
+                    for n in range(side.slot_count):
+                        clear(state.candidate[g, side.first_slot + n], i)
+                    meeting.count[i] = 0
+                    meeting.travel[i] = -1.0
+        for i in range(LANES):
+            lane.keeps[i] = lane.stale[i]
 
-    return collision_step
+    return forget

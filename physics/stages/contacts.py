@@ -10,13 +10,14 @@ from functools import cache
 
 import numpy as np
 
+from physics.group import note_touch
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.relative import relative_motion, relative_pose
-from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
+from physics.stages.touch import make_touch
 
 # one row a slot: what a report tells of the candidates there
 REPORT = np.dtype(
@@ -39,9 +40,8 @@ def make_loop(features, kind, report):
     """
     friction = features.friction
     normal_force = dashpot_force if features.dashpot else overlap_force
-    plane, particles = kind == PLANE, kind == PARTICLES
-    box = kind == BOX
-    surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
+    plane, box = kind == PLANE, kind == BOX
+    touch = make_touch(kind)
 
     @kernel
     def loop(slots, candidate, seen, active, constants, h, rows):
@@ -56,32 +56,12 @@ def make_loop(features, kind, report):
         mass_rate = constants.pair_mass / h if h > 0.0 else 0.0
         for n in range(slots):
             row = candidate[n]
-            sample, weights, memories, loads = row.sample, row.weight, row.impact_speed, row.load
+            weights, memories, loads = row.weight, row.impact_speed, row.load
             for i in range(LANES):
-                x, y, z, weight = sample[0, i], sample[1, i], sample[2, i], weights[i]
-                rx = R[0, i] * x + R[1, i] * y + R[2, i] * z
-                ry = R[3, i] * x + R[4, i] * y + R[5, i] * z
-                rz = R[6, i] * x + R[7, i] * y + R[8, i] * z
-                if plane:
-                    overlap = radius - (rz + (c[2, i] - ca))
-                    rz -= owner_radius - 0.5 * overlap
-                else:
-                    px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
-                    if particles:
-                        px -= row.partner[0, i]
-                        py -= row.partner[1, i]
-                        pz -= row.partner[2, i]
-                    if box:
-                        distance, nx, ny, nz, face = box_distance(
-                            px, py, pz, ca, cb, cc, row.face[i], radius, sharp
-                        )
-                    else:
-                        distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
-                    overlap = radius - distance
-                    arm = owner_radius - 0.5 * overlap
-                    rx -= arm * nx
-                    ry -= arm * ny
-                    rz -= arm * nz
+                weight = weights[i]
+                rx, ry, rz, nx, ny, nz, overlap, face = touch(
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
+                )
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -243,20 +223,12 @@ def make_contacts(features):
 
     @stage
     def contacts(model, state, work, g, h, elapsed):
-        start, stale = work.lane[0].start, work.lane[0].stale
         for k in range(model.side.shape[0]):
-            meeting = work.side[k]
-            if meeting.slots > 0:
+            if work.side[k].slots > 0:
                 side(model, state, work, (), g, k, h)
                 constants = model.side[k]
                 owner = work.solid[constants.owner]
                 seen = owner if constants.kind == PLANE else work.relative[0]
-                pressed, first = seen.pressed, meeting.first_touch
-                for i in range(LANES):
-                    time = start[i] + elapsed
-                    before = (pressed[i] <= 0.0) | (first[i] <= time)
-                    # a look is only meant for states that were set
-                    before = before | ((h == 0.0) & (stale[i] == 0))
-                    first[i] = first[i] if before else time
+                note_touch(work, k, seen.pressed, elapsed)
 
     return contacts

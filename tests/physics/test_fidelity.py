@@ -59,6 +59,19 @@ def test_a_number_is_finite_positive_and_within_its_limits(field):
             Fidelity(**{field: LIMITS[field] * 1.01})
 
 
+def test_each_law_has_its_largest_contact_resolution():
+    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*0\.7\], got 1\.8"):
+        Fidelity(contact_resolution=1.8)
+    assert Fidelity(law="impulse", contact_resolution=2.0).contact_resolution == 2.0
+    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*2\], got 2\.1"):
+        Fidelity(law="impulse", contact_resolution=2.1)
+
+
+def test_damping_by_a_dashpot_belongs_to_the_spring_law():
+    with pytest.raises(ValueError, match=r"Fidelity\.damping 'dashpot' belongs to law='spring'"):
+        Fidelity(law="impulse", damping="dashpot")
+
+
 def test_collision_substeps_are_counted_from_one():
     with pytest.raises(ValueError, match=r"Fidelity\.collision_substeps must be at least 1, got 0"):
         Fidelity(collision_substeps=0)

@@ -11,7 +11,7 @@ import rigid_envs  # noqa: F401  (registers the ids)
 
 PUSH = "RigidEnvs/Push-v0"
 IDS = [PUSH]
-PRESETS = ["fast", "balanced", "accurate"]
+PRESETS = ["fast", "balanced", "accurate", "solid"]
 REWARDS = ["sparse", "dense"]
 EPISODE = 50
 

@@ -1,0 +1,216 @@
+"""Instantaneous collisions with restitution, of any number of contacts at once.
+
+A contact collides if it closes faster than the floor, (v_a - v_b) n < -v_0, and will have touched
+by the middle of the coming drift. All that touches takes part: a blow on a stack is felt below it.
+Poisson's hypothesis, which unlike Newton's needs no more care for several contacts than for one:
+
+1. compression: impulses p >= 0 that stop all approach, with Coulomb friction, found by rounds of
+   Gauss-Seidel; each correction takes energy or leaves it;
+2. restitution: every colliding contact gives e p again, all at once. Without friction the speeds
+   become -e times what they were. The energy that this returns is e^2 of what compression took;
+   if, by friction's doing, it would be more, it is scaled down to that: no collision gains energy;
+3. friction anew, with what now presses, and no approach at contacts that only took part.
+
+The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the factor is the impulse.
+"""
+
+import math
+from functools import cache
+
+from physics.jit import LANES, kernel, stage
+from physics.stages.kinematics import turned_back
+from physics.stages.points import ends, give, slip
+
+# Rounds end when none has changed a speed by more than this share of the fastest approach, or after
+# so many
+SMALL, ROUNDS = 1e-6, 64
+
+
+@kernel
+def find(points, owner, surface, constants, h, struck, speed):
+    """Notes the restitution of each point that collides, and which lanes have one."""
+    e, floor = constants.restitution, constants.rest_speed
+    for n in range(points.shape[0]):
+        point = points[n]
+        for i in range(LANES):
+            ux, uy, uz = slip(owner, surface, point, i)
+            nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+            un = ux * nx + uy * ny + uz * nz
+            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= 0.0)
+            collides = collides & (point.weight[i] > 0.0)
+            bounce = e if collides else 0.0
+            point.bounce[i] = bounce
+            point.hit[i] = 0.0
+            for axis in range(3):
+                point.skid[axis, i] = 0.0
+            struck[i] = 1 if bounce > 0.0 else struck[i]
+            speed[i] = max(speed[i], -un) if bounce > 0.0 else speed[i]
+
+
+@cache
+def make_press(features):
+    """Kernel of one round over one side's points."""
+    friction = features.friction
+
+    @kernel
+    def press(points, owner, surface, A, B, ma, mb, mu, going, change, after):
+        """`after` restitution, contacts that bounce keep what they gave along the normal."""
+        for n in range(points.shape[0]):
+            point = points[n]
+            for i in range(LANES):
+                part = (point.gap[i] <= 0.0) | (point.bounce[i] > 0.0)
+                part = part & (point.weight[i] > 0.0) & (going[i] != 0)
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+                ux, uy, uz = slip(owner, surface, point, i)
+                un = ux * nx + uy * ny + uz * nz
+                hit = point.hit[i]
+                new = max(hit - point.mass[i] * un, 0.0)
+                kept = (not part) | (after & (point.bounce[i] > 0.0))
+                new = hit if kept else new
+                step = new - hit
+                point.hit[i] = new
+                change[i] = max(change[i], abs(step) / point.mass[i])
+                give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+                if friction:
+                    ux, uy, uz = slip(owner, surface, point, i)
+                    un = ux * nx + uy * ny + uz * nz
+                    m = point.shear_mass[i]
+                    px, py, pz = point.skid[0, i], point.skid[1, i], point.skid[2, i]
+                    qx = px - m * (ux - un * nx)
+                    qy = py - m * (uy - un * ny)
+                    qz = pz - m * (uz - un * nz)
+                    limit = mu * new
+                    size = math.sqrt(qx * qx + qy * qy + qz * qz)
+                    cut = limit / size if size > limit else 1.0
+                    qx = cut * qx if part else px
+                    qy = cut * qy if part else py
+                    qz = cut * qz if part else pz
+                    point.skid[0, i] = qx
+                    point.skid[1, i] = qy
+                    point.skid[2, i] = qz
+                    px, py, pz = qx - px, qy - py, qz - pz
+                    size = max(abs(px), max(abs(py), abs(pz)))
+                    change[i] = max(change[i], size / m)
+                    give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
+
+    return press
+
+
+@kernel
+def give_back(points, owner, surface, A, B, ma, mb, share, again):
+    """Restitution: e of what compression gave; `again`, all but a share of it is taken back."""
+    for n in range(points.shape[0]):
+        point = points[n]
+        for i in range(LANES):
+            e = point.bounce[i]
+            compression = point.hit[i] / (1.0 + e) if again else point.hit[i]
+            step = (share[i] - 1.0) * e * compression if again else e * compression
+            point.hit[i] += step
+            nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+            give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+
+
+@kernel
+def kinetic_energy(model, work, energy):
+    """J, by the velocities of the moment."""
+    for i in range(LANES):
+        energy[i] = 0.0
+    for m in range(model.mover.shape[0]):
+        solid, constants = work.solid[m], model.mover[m]
+        v, omega = solid.velocity, solid.spin
+        mass, j = 1.0 / constants.inverse_mass, constants.inertia
+        jx, jy, jz = j[0], j[1], j[2]
+        for i in range(LANES):
+            twice = mass * (v[0, i] * v[0, i] + v[1, i] * v[1, i] + v[2, i] * v[2, i])
+            if constants.turns:
+                x, y, z = turned_back(solid.rotation, i, omega[0, i], omega[1, i], omega[2, i])
+                twice += jx * x * x + jy * y * y + jz * z * z
+            energy[i] += 0.5 * twice
+
+
+@stage
+def book_hits(model, work):
+    """Counts the collision's impulses among what this step gave."""
+    for k in range(model.side.shape[0]):
+        first = model.side[k].first_slot
+        for n in range(first, first + work.side[k].slots):
+            point = work.point[n]
+            for axis in range(3):
+                for i in range(LANES):
+                    point.spent[axis, i] += (
+                        point.hit[i] * point.normal[axis, i] + point.skid[axis, i]
+                    )
+
+
+@cache
+def make_impacts(features):
+    """Kernel that lets contacts collide where they do."""
+    press = make_press(features)
+
+    @kernel
+    def press_all(model, work, after):
+        """Rounds over all contacts until nothing moves; lanes that have settled are left alone."""
+        lane = work.lane[0]
+        for i in range(LANES):
+            lane.going[i] = lane.struck[i]
+        for _ in range(ROUNDS):
+            for i in range(LANES):
+                lane.change[i] = 0.0
+            for k in range(model.side.shape[0]):
+                if work.side[k].slots > 0:
+                    points, A, B, ma, mb = ends(model, work, k)
+                    a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                    mu = model.side[k].friction
+                    press(points, a, b, A, B, ma, mb, mu, lane.going, lane.change, after)
+            going = 0
+            for i in range(LANES):
+                lane.going[i] = lane.going[i] if lane.change[i] > SMALL * lane.speed[i] else 0
+                going += lane.going[i]
+            if going == 0:
+                break
+
+    @kernel
+    def restitute(model, work, again):
+        for k in range(model.side.shape[0]):
+            if work.side[k].slots > 0:
+                points, A, B, ma, mb = ends(model, work, k)
+                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                give_back(points, a, b, A, B, ma, mb, work.lane[0].share, again)
+
+    @kernel
+    def collide(model, work):
+        lane = work.lane[0]
+        kinetic_energy(model, work, lane.before)
+        press_all(model, work, False)
+        kinetic_energy(model, work, lane.pressed)
+        restitute(model, work, False)
+        kinetic_energy(model, work, lane.parted)
+        e = 0.0
+        for k in range(model.side.shape[0]):
+            e = max(e, model.side[k].restitution)
+        for i in range(LANES):
+            lost, won = lane.before[i] - lane.pressed[i], lane.parted[i] - lane.pressed[i]
+            allowed = e * e * max(lost, 0.0)
+            lane.share[i] = math.sqrt(allowed / won) if won > allowed else 1.0
+        restitute(model, work, True)
+        press_all(model, work, True)
+        book_hits(model, work)
+
+    @stage
+    def impacts(model, work, h):
+        lane = work.lane[0]
+        for i in range(LANES):
+            lane.struck[i] = 0
+            lane.speed[i] = 0.0
+        for k in range(model.side.shape[0]):
+            if work.side[k].slots > 0:
+                points = ends(model, work, k)[0]
+                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                find(points, a, b, model.side[k], h, lane.struck, lane.speed)
+        any_struck = 0
+        for i in range(LANES):
+            any_struck += lane.struck[i]
+        if any_struck > 0:
+            collide(model, work)
+
+    return impacts

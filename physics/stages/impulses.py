@@ -1,0 +1,261 @@
+"""The impulse law: contacts that push as hard as it takes for solids not to approach.
+
+The force of a step is an impulse over its time, found by going round the contacts and correcting
+one after another (Gauss-Seidel), once a substep: many short substeps converge faster than many
+rounds of a long one. Impulses of the last substep are the first guess. With u = (v_a - v_b) at the
+point, half a step old, and n out of the surface, a substep does
+
+1. collides: instantaneous collisions with restitution, see `stages/impacts.py`;
+2. relaxes: with the impulses of the last substep to start from, u n >= 0. That takes away what
+   pushed overlaps apart, which so moves bodies but gives them no energy;
+3. gives outside forces and the guess, then solves u n >= -gap/h ahead of the contact and, where
+   solids overlap, the soft contact below.
+
+A soft contact is a spring k and damper c whose force is that at the end of the step. With
+a = h (c + h k) and the impulse p so far, p changes by -(u n + k h/a gap + p/a) m a/(m + a), for a
+point that feels the mass m: stable at any step, for any k. At rest it sinks as the spring of that
+stiffness would, load / k. The speed at which overlap is pushed apart is limited.
+
+Friction is rigid: it takes what speed across the contact remains, up to mu times the impulse along
+it. An anchor remembers how far the point has crept since it came to stick, and pulls it back. The
+mass across is the least in any direction, so that the step stays a descent of the energy that the
+cone can't turn into an ascent.
+"""
+
+import math
+from functools import cache
+
+from physics.group import note_touch
+from physics.jit import LANES, kernel, stage
+from physics.stages.impacts import make_impacts
+from physics.stages.kinematics import turned_back
+from physics.stages.points import cross, ends, give, make_points, place_tensors, slip, times
+
+# m/s at which overlaps are pushed apart at most
+PUSH_SPEED = 1.0
+# 1/s at which an anchor takes its stretch back
+ANCHOR = 5.0
+
+
+@cache
+def make_sweep(features):
+    """Kernel that corrects the impulses of one side's points, one after another."""
+    friction = features.friction
+
+    @kernel
+    def sweep(points, owner, surface, A, B, ma, mb, constants, h, soft):
+        """`soft`: with the bias that pushes overlaps apart, and the softness that goes with it."""
+        mu, bounces, floor = constants.friction, constants.restitution > 0.0, constants.rest_speed
+        K, C = constants.stiffness, constants.damping
+        rate, per_h = K / (C + h * K), 1.0 / h
+        for n in range(points.shape[0]):
+            point = points[n]
+            for i in range(LANES):
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+                gap, weight, m, push = point.gap[i], point.weight[i], point.mass[i], point.push[i]
+                ux, uy, uz = slip(owner, surface, point, i)
+                un = ux * nx + uy * ny + uz * nz
+                ahead = gap > 0.0
+                bias = gap * per_h if ahead else 0.0
+                mass, leak = m, 0.0
+                if soft:
+                    a = h * weight * (C + h * K)
+                    yielding = not ahead
+                    leak = m / (m + a) if yielding else 0.0
+                    mass = a * leak if yielding else m
+                    bias = max(rate * gap, -PUSH_SPEED) if yielding else bias
+                # what will bounce must arrive at its full speed
+                if bounces:
+                    bias = -un if ahead & (un < -floor) else bias
+                new = max(push - mass * (un + bias) - leak * push, 0.0)
+                new = new if weight > 0.0 else 0.0
+                step = new - push
+                point.push[i] = new
+                give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+                if friction:
+                    ux, uy, uz = slip(owner, surface, point, i)
+                    un = ux * nx + uy * ny + uz * nz
+                    sx, sy, sz = ux - un * nx, uy - un * ny, uz - un * nz
+                    if soft:
+                        sx += ANCHOR * point.anchor[0, i]
+                        sy += ANCHOR * point.anchor[1, i]
+                        sz += ANCHOR * point.anchor[2, i]
+                    mt = point.shear_mass[i]
+                    px, py, pz = point.pull[0, i], point.pull[1, i], point.pull[2, i]
+                    qx, qy, qz = px - mt * sx, py - mt * sy, pz - mt * sz
+                    limit = mu * new
+                    size = math.sqrt(qx * qx + qy * qy + qz * qz)
+                    cut = limit / size if size > limit else 1.0
+                    qx *= cut
+                    qy *= cut
+                    qz *= cut
+                    point.pull[0, i] = qx
+                    point.pull[1, i] = qy
+                    point.pull[2, i] = qz
+                    if soft:
+                        holds = size <= limit
+                        point.anchor[0, i] = point.anchor[0, i] if holds else 0.0
+                        point.anchor[1, i] = point.anchor[1, i] if holds else 0.0
+                        point.anchor[2, i] = point.anchor[2, i] if holds else 0.0
+                    give(owner, surface, A, B, ma, mb, point, i, qx - px, qy - py, qz - pz)
+
+    return sweep
+
+
+@cache
+def make_warm(features):
+    """Kernel that gives the impulses of the last substep anew, and books what relaxing gave."""
+    friction = features.friction
+
+    @kernel
+    def warm(points, owner, surface, A, B, ma, mb):
+        for n in range(points.shape[0]):
+            point = points[n]
+            for i in range(LANES):
+                push = point.push[i]
+                px, py, pz = (
+                    push * point.normal[0, i],
+                    push * point.normal[1, i],
+                    push * point.normal[2, i],
+                )
+                if friction:
+                    px += point.pull[0, i]
+                    py += point.pull[1, i]
+                    pz += point.pull[2, i]
+                point.spent[0, i] += px
+                point.spent[1, i] += py
+                point.spent[2, i] += pz
+                give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
+
+    return warm
+
+
+@cache
+def make_book(features):
+    """Kernel that adds the forces of one side's points, and keeps what they remember."""
+    friction = features.friction
+
+    @kernel
+    def book(points, candidate, owner, surface, keeps, h, pressed):
+        Q, per_h = surface.rotation, 1.0 / h
+        F, T, G, U = owner.force, owner.torque, surface.force, surface.torque
+        for n in range(points.shape[0]):
+            point, row = points[n], candidate[n]
+            for i in range(LANES):
+                push = point.push[i]
+                fx = point.spent[0, i] + push * point.normal[0, i]
+                fy = point.spent[1, i] + push * point.normal[1, i]
+                fz = point.spent[2, i] + push * point.normal[2, i]
+                pressed[i] += push + point.hit[i]
+                row.load[i] = per_h * push if keeps[i] != 0 else row.load[i]
+                if friction:
+                    px, py, pz = point.pull[0, i], point.pull[1, i], point.pull[2, i]
+                    fx += px
+                    fy += py
+                    fz += pz
+                    px, py, pz = turned_back(Q, i, per_h * px, per_h * py, per_h * pz)
+                    row.pull[0, i] = px if keeps[i] != 0 else row.pull[0, i]
+                    row.pull[1, i] = py if keeps[i] != 0 else row.pull[1, i]
+                    row.pull[2, i] = pz if keeps[i] != 0 else row.pull[2, i]
+                    sx, sy, sz = turned_back(
+                        Q, i, point.anchor[0, i], point.anchor[1, i], point.anchor[2, i]
+                    )
+                    row.shear[0, i] = sx if keeps[i] != 0 else row.shear[0, i]
+                    row.shear[1, i] = sy if keeps[i] != 0 else row.shear[1, i]
+                    row.shear[2, i] = sz if keeps[i] != 0 else row.shear[2, i]
+                fx *= per_h
+                fy *= per_h
+                fz *= per_h
+                F[0, i] += fx
+                F[1, i] += fy
+                F[2, i] += fz
+                G[0, i] -= fx
+                G[1, i] -= fy
+                G[2, i] -= fz
+                tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], fx, fy, fz)
+                T[0, i] += tx
+                T[1, i] += ty
+                T[2, i] += tz
+                bx, by, bz = (
+                    point.surface_arm[0, i],
+                    point.surface_arm[1, i],
+                    point.surface_arm[2, i],
+                )
+                tx, ty, tz = cross(bx, by, bz, fx, fy, fz)
+                U[0, i] -= tx
+                U[1, i] -= ty
+                U[2, i] -= tz
+
+    return book
+
+
+@stage
+def outside(model, work, h):
+    """Gives every mover the impulse of the forces that are already known."""
+    for m in range(model.mover.shape[0]):
+        solid, entry = work.solid[m], work.tensor[m].entry
+        v, omega, F, T = solid.velocity, solid.spin, solid.force, solid.torque
+        step = h * model.mover[m].inverse_mass
+        for i in range(LANES):
+            v[0, i] += step * F[0, i]
+            v[1, i] += step * F[1, i]
+            v[2, i] += step * F[2, i]
+            tx, ty, tz = times(entry, i, T[0, i], T[1, i], T[2, i])
+            omega[0, i] += h * tx
+            omega[1, i] += h * ty
+            omega[2, i] += h * tz
+
+
+@cache
+def make_impulses(features):
+    """Stage that adds the contact forces of all sides, and notes first touches."""
+    points, impacts = make_points(features), make_impacts(features)
+    sweep, warm, book = make_sweep(features), make_warm(features), make_book(features)
+    restitution = features.restitution
+
+    @kernel
+    def correct(model, work, h, soft):
+        """One round over all contacts."""
+        for k in range(model.side.shape[0]):
+            if work.side[k].slots > 0:
+                here, A, B, ma, mb = ends(model, work, k)
+                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                sweep(here, a, b, A, B, ma, mb, model.side[k], h, soft)
+
+    @kernel
+    def finish(model, state, work, g, k, h, elapsed):
+        here = ends(model, work, k)[0]
+        owner, surface = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+        first, keeps = model.side[k].first_slot, work.lane[0].keeps
+        for i in range(LANES):
+            owner.pressed[i] = 0.0
+        candidate = state.candidate[g, first : first + here.shape[0]]
+        book(here, candidate, owner, surface, keeps, h, owner.pressed)
+        note_touch(work, k, owner.pressed, elapsed)
+
+    @kernel
+    def impulses(model, state, work, g, h, elapsed):
+        sides, touching = model.side.shape[0], 0
+        for k in range(sides):
+            touching += work.side[k].slots
+        if touching == 0:
+            return
+        place_tensors(model, work)
+        for k in range(sides):
+            if work.side[k].slots > 0:
+                points(model, state, work, g, k, work.lane[0].keeps, h)
+        if restitution:
+            impacts(model, work, h)
+        correct(model, work, h, False)
+        outside(model, work, h)
+        for k in range(sides):
+            if work.side[k].slots > 0:
+                here, A, B, ma, mb = ends(model, work, k)
+                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                warm(here, a, b, A, B, ma, mb)
+        correct(model, work, h, True)
+        for k in range(sides):
+            if work.side[k].slots > 0:
+                finish(model, state, work, g, k, h, elapsed)
+
+    return impulses

@@ -1,0 +1,62 @@
+"""Where a candidate touches: the point, the normal and the overlap, in the frame of the surface.
+
+The contact point lies in the middle of the overlap, on the line from the sample along the normal.
+"""
+
+from functools import cache
+
+from physics.jit import stage
+from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE
+from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
+
+
+@cache
+def make_touch(kind):
+    """Formula for samples against one kind of surface."""
+    plane, particles, box = kind == PLANE, kind == PARTICLES, kind == BOX
+    surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
+
+    @stage
+    def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, sharp):
+        """Of the candidate in lane i of a slot.
+
+        Args:
+            row: the slot.
+            i: the lane.
+            R: the owner's rotation, as seen from the surface.
+            c: m, the owner's position, likewise.
+            ca: m, first parameter of the surface's core.
+            cb: m, its second.
+            cc: m, its third.
+            radius: m, of sample and surface together.
+            owner_radius: m, of the sample.
+            sharp: see `box_distance`.
+
+        Returns:
+            Arm x y z in m from the owner's centre to the contact point, normal x y z out of the
+            surface, overlap in m (negative if apart), and the face of a box to remember, else 0.
+        """
+        x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
+        rx = R[0, i] * x + R[1, i] * y + R[2, i] * z
+        ry = R[3, i] * x + R[4, i] * y + R[5, i] * z
+        rz = R[6, i] * x + R[7, i] * y + R[8, i] * z
+        if plane:
+            overlap = radius - (rz + (c[2, i] - ca))
+            return rx, ry, rz - (owner_radius - 0.5 * overlap), 0.0, 0.0, 1.0, overlap, 0.0
+        px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
+        face = 0.0
+        if particles:
+            px -= row.partner[0, i]
+            py -= row.partner[1, i]
+            pz -= row.partner[2, i]
+        if box:
+            distance, nx, ny, nz, face = box_distance(
+                px, py, pz, ca, cb, cc, row.face[i], radius, sharp
+            )
+        else:
+            distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
+        overlap = radius - distance
+        arm = owner_radius - 0.5 * overlap
+        return rx - arm * nx, ry - arm * ny, rz - arm * nz, nx, ny, nz, overlap, face
+
+    return touch
