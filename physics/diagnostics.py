@@ -176,30 +176,33 @@ def penetration(model: Model, features: Features, state: State) -> Array:
 
 def contact_shares(
     model: Model, features: Features, state: State, world: int
-) -> dict[int, tuple[Array, Array]]:
+) -> dict[int, tuple[Array, Array, Array]]:
     """How a world's present contacts share their side's unit stiffness, by side.
 
     Returns:
-        For each side that touches two matrices [6 m, 6 m]: along the normals and across them.
+        For each side that touches three matrices [6 m, 6 m]: along the normals, across them, and
+        of relative turns.
         Coordinates are each mover's displacement, then its rotation vector, in the world frame.
     """
     told = report(model, features, state, world)
     movers = len(model.mover)
-    shares: dict[int, tuple[Array, Array]] = {}
+    shares: dict[int, tuple[Array, Array, Array]] = {}
     for k, point, normal, weight in zip(
         told.side, told.point, told.normal, told.weight, strict=True
     ):
         constants = model.side[k]
-        jacobian = np.zeros((3, 6 * movers))
+        jacobian, spin = np.zeros((2, 3, 6 * movers))
         for solid, sign in ((constants["owner"], 1.0), (constants["surface"], -1.0)):
             if solid < movers:
                 arm = point - state.mover["position"][world, solid]
                 columns = slice(6 * solid, 6 * solid + 6)
                 jacobian[:, columns] = sign * point_jacobian(arm)
+                spin[:, 6 * solid + 3 : 6 * solid + 6] = sign * np.eye(3)
         along = jacobian.T @ np.outer(normal, normal) @ jacobian
         across = jacobian.T @ jacobian - along
-        before = shares.get(int(k), (0.0, 0.0))
-        shares[int(k)] = (before[0] + weight * along, before[1] + weight * across)
+        along_k, across_k, turn_k = shares.get(int(k), (0.0, 0.0, 0.0))
+        turn = weight * spin.T @ spin
+        shares[int(k)] = (along_k + weight * along, across_k + weight * across, turn_k + turn)
     return shares
 
 

@@ -17,6 +17,8 @@ class Features(NamedTuple):
         restitution: of the impulse law: any pair bounces.
         dashpot: linear damping in place of the one continuous in overlap.
         friction: any pair has friction: tangential law and history.
+        viscous: friction without history.
+        resistance: any pair resists rolling or spinning.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         drives: there are driven tools.
@@ -26,6 +28,8 @@ class Features(NamedTuple):
     restitution: bool
     dashpot: bool
     friction: bool
+    viscous: bool
+    resistance: bool
     rotation: int
     plane: bool
     sphere: bool

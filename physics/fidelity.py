@@ -7,6 +7,7 @@ from physics.validation import choice, integer, number, positive
 LAWS = ("spring", "impulse")
 GEOMETRIES = ("shape", "particle")
 DAMPINGS = ("overlap", "dashpot")
+FRICTIONS = ("coulomb", "viscous")
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Fidelity:
             "particle": spheres against spheres, any shape, never quite a flat face.
         damping: of the spring law alone. "overlap": continuous at first touch, restitution
             independent of where in a step the touch falls; "dashpot": linear, for comparison.
+        friction: "coulomb": static and sliding, with memory; "viscous": in proportion to the slip
+            up to the same limit, which holds nothing still but costs least. Of the spring law.
         substep: s, the longest step of the integrator.
         collision_substeps: substeps to a collision step; candidates are looked for once in one,
             and again within it where a body outruns the skin.
@@ -37,6 +40,7 @@ class Fidelity:
     law: str = "spring"
     geometry: str = "shape"
     damping: str = "overlap"
+    friction: str = "coulomb"
     substep: float = 2e-3
     collision_substeps: int = 5
     contact_resolution: float = 0.5
@@ -49,11 +53,13 @@ class Fidelity:
         choice("Fidelity.law", self.law, LAWS)
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
         choice("Fidelity.damping", self.damping, DAMPINGS)
-        if self.law == "impulse" and self.damping != "overlap":
-            raise ValueError(
-                f"Fidelity.damping {self.damping!r} belongs to law='spring'; with law='impulse' "
-                "Material.restitution needs none: leave damping out"
-            )
+        choice("Fidelity.friction", self.friction, FRICTIONS)
+        for name, only in (("damping", "overlap"), ("friction", "coulomb")):
+            if self.law == "impulse" and getattr(self, name) != only:
+                raise ValueError(
+                    f"Fidelity.{name} {getattr(self, name)!r} belongs to law='spring'; with "
+                    f"law='impulse' leave {name} out"
+                )
         object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
         together = integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
         object.__setattr__(self, "collision_substeps", together)

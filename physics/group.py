@@ -56,6 +56,7 @@ REMEMBERED = np.dtype(
         ("load", "f8"),
         ("shear", "f8", (3,)),
         ("pull", "f8", (3,)),
+        ("twist", "f8", (3,)),
         ("slid", "f8"),
         ("face", "f8"),
     ],
@@ -68,7 +69,8 @@ NEAR = np.dtype(
         ("position", "f8", (3,)),  # m, in the world, as the others
         ("normal", "f8", (3,)),  # out of the surface of the pair's first side
         ("gap", "f8"),  # m
-        ("group", "i8"),  # 1: touches with the same face as the nearest
+        ("weight", "f8"),
+        ("group", "i8"),  # of those that touch with the same face, 0 before
         ("chosen", "i8"),
     ],
     align=True,
@@ -86,6 +88,8 @@ POINT = np.dtype(
         ("shear_mass", "f8", (LANES,)),  # kg, the least that one across it feels
         ("push", "f8", (LANES,)),  # N s along the normal
         ("pull", "f8", (3, LANES)),  # N s across it
+        ("twist", "f8", (3, LANES)),  # N m s against rolling and spinning
+        ("turned", "f8", (3, LANES)),  # N m s given in this step beyond twist
         ("anchor", "f8", (3, LANES)),  # m, how far the point has left where it came to stick
         ("spent", "f8", (3, LANES)),  # N s given in this step beyond push and pull
         ("bounce", "f8", (LANES,)),  # restitution of an instantaneous collision, 0 if none

@@ -72,6 +72,10 @@ SIDE = np.dtype(
         ("shear_stiffness", "f8"),  # N/m
         ("shear_damping", "f8"),  # N s/m
         ("friction", "f8"),
+        ("rolling", "f8"),  # m, of the resistance against it
+        ("spinning", "f8"),  # m, likewise
+        ("twist_stiffness", "f8"),  # N m
+        ("twist_damping", "f8"),  # N m s
     ],
     align=True,
 )
@@ -113,6 +117,20 @@ def _pair_material(a: Material, b: Material) -> tuple[float, float, float | None
     given = [m.stiffness for m in (a, b) if m.stiffness is not None]
     stiffness = 1.0 / sum(1.0 / k for k in given) if given else None
     return math.sqrt(a.friction * b.friction), max(a.restitution, b.restitution), stiffness
+
+
+def _resistance(a: Material, b: Material) -> tuple[float, float]:
+    """Lengths in m of the resistance against rolling and spinning."""
+    rolling = max(a.rolling_resistance, b.rolling_resistance)
+    return rolling, max(a.spinning_resistance, b.spinning_resistance)
+
+
+def _least_inertia(solid: Solid) -> float:
+    """Smallest principal moment in kg m^2; infinite for what doesn't turn."""
+    if not isinstance(solid, Body):
+        return math.inf
+    assert solid.mass is not None
+    return float(solid.shape.inertia(solid.mass).min())
 
 
 def _spacing(solid: Solid, scene: Scene, fidelity: Fidelity) -> float:
@@ -244,6 +262,12 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         row["shear_stiffness"], row["shear_damping"] = tangential_coefficients(
             stiffness, pair_mass, shear_mass, _leverage(a) + _leverage(b), fidelity.substep
         )
+        turning = 1.0 / _least_inertia(a) + 1.0 / _least_inertia(b)
+        if turning > 0.0:  # a tool that meets the ground turns no more than that
+            row["rolling"], row["spinning"] = _resistance(a.material, b.material)
+            row["twist_stiffness"], row["twist_damping"] = tangential_coefficients(
+                omega**2 / turning, 1.0 / turning, 1.0 / turning, 0.0, fidelity.substep
+            )
         damping = damping_coefficient(restitution, fidelity.damping)
         row["owner"], row["surface"], row["kind"] = pair.owner, pair.other, pair.surface.kind
         row["mirror"] = ways.get((pair.other, pair.owner), -1)
@@ -294,12 +318,21 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
     inert = all(isinstance(b.shape, Sphere) and not any(b.angular_velocity) for b in scene.bodies)
     moments = model.mover["inertia"][: len(scene.bodies)]
     isotropic = bool(np.all(moments == moments[:, :1]))
-    rotation = NO_ROTATION if inert and not friction else ISOTROPIC if isotropic else GENERAL
+    resistance = bool(np.any(model.side["rolling"] + model.side["spinning"] > 0.0))
+    rotation = (
+        NO_ROTATION
+        if inert and not (friction or resistance)
+        else ISOTROPIC
+        if isotropic
+        else GENERAL
+    )
     return Features(
         impulse=impulse,
         restitution=impulse and bool(np.any(model.side["restitution"] > 0.0)),
         dashpot=not impulse and fidelity.damping == "dashpot" and len(model.side) > 0,
         friction=friction,
+        viscous=friction and fidelity.friction == "viscous",
+        resistance=resistance,
         rotation=rotation,
         plane=PLANE in kinds,
         sphere=SPHERE in kinds,

@@ -27,18 +27,25 @@ class Material:
             larger of its two.
         stiffness: N/m of one face in contact, or None: then it follows from the fidelity's step and
             contact resolution and from the masses of the pair.
+        rolling_resistance: m; a contact resists rolling by at most this times its normal force, as
+            if that acted so far ahead. A pair has the larger of its two.
+        spinning_resistance: m; likewise against spinning about the normal.
     """
 
     friction: float = 0.5
     restitution: float = 0.1
     stiffness: float | None = None
+    rolling_resistance: float = 0.0
+    spinning_resistance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Checks the three numbers."""
+        """Checks the numbers."""
         object.__setattr__(self, "friction", number("Material.friction", self.friction, low=0.0))
         object.__setattr__(
             self, "restitution", number("Material.restitution", self.restitution, low=0.0, high=1.0)
         )
+        for name in ("rolling_resistance", "spinning_resistance"):
+            object.__setattr__(self, name, number(f"Material.{name}", getattr(self, name), low=0.0))
         if self.stiffness is not None:
             object.__setattr__(self, "stiffness", positive("Material.stiffness", self.stiffness))
 

@@ -32,6 +32,7 @@ _FLIP = 2.0
 _LONGEST = 1e3  # s, a step that no contact limits
 # partners that a body can lie between at once: a cube has six faces
 _PARTNERS = 6
+_TURN = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
 
 def _normal(side: Any, dashpot: bool, h: float) -> float:
@@ -49,11 +50,19 @@ def _normal(side: Any, dashpot: bool, h: float) -> float:
     return (phi * (h * c + 0.5 * h * h * k) + 2.0 * m * (1.0 - phi)) / (2.0 - phi)
 
 
-def _across(side: Any, h: float) -> float:
+def _across(side: Any, viscous: bool, h: float) -> float:
     """A in kg of a side's whole shear stiffness."""
     if side["friction"] == 0.0:
         return 0.0
-    return h * float(side["shear_damping"]) + 0.5 * h * h * float(side["shear_stiffness"])
+    spring = 0.0 if viscous else 0.5 * h * h * float(side["shear_stiffness"])
+    return h * float(side["shear_damping"]) + spring
+
+
+def _twist(side: Any, h: float) -> float:
+    """A in kg m^2 of a side's whole resistance against rolling and spinning."""
+    if side["rolling"] == 0.0 and side["spinning"] == 0.0:
+        return 0.0
+    return h * float(side["twist_damping"]) + 0.5 * h * h * float(side["twist_stiffness"])
 
 
 def _servo(mover: Any, h: float) -> float:
@@ -84,9 +93,10 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
 
     def load(h: float) -> float:
         A = np.zeros_like(inverse)
-        for k, (along, across) in shares.items():
+        for k, (along, across, turn) in shares.items():
             side = model.side[k]
-            A += _normal(side, features.dashpot, h) * along + _across(side, h) * across
+            A += _normal(side, features.dashpot, h) * along
+            A += _across(side, features.viscous, h) * across + _twist(side, h) * turn
         for i, mover in enumerate(model.mover):
             block = slice(6 * i, 6 * i + 3)
             A[block, block] += _servo(mover, h) * np.eye(3)
@@ -140,8 +150,9 @@ def _of_mover(
             if other < len(model.mover):
                 share *= 1.0 + model.mover[other]["inverse_mass"] / row["inverse_mass"]
             normal = share * sum(_normal(side, features.dashpot, h) for side in sides)
-            shear = share * sum(_across(side, h) for side in sides)
-            each.append(max(_largest(inverse, normal * n + shear * t) for n, t in sides_of))
+            shear = share * sum(_across(side, features.viscous, h) for side in sides)
+            twist = share * sum(_twist(side, h) for side in sides) * _TURN
+            each.append(max(_largest(inverse, normal * n + shear * t + twist) for n, t in sides_of))
         if features.impulse:  # soft contacts are solved for the end of the step
             each = []
         return float(sum(sorted(each)[-_PARTNERS:]) + _servo(row, h) * row["inverse_mass"])

@@ -59,12 +59,15 @@ def candidate_dtype(features: Features) -> np.dtype:
     ]
     if not features.impulse:
         fields.append(("impact_speed", "f8", (LANES,)))  # m/s, see overlap_force
-    if features.friction:
+    if features.friction and not features.viscous:
         fields.append(("shear", "f8", (3, LANES)))  # m
         if features.impulse:
             fields.append(("pull", "f8", (3, LANES)))  # N, of friction, in the surface's frame
         else:
             fields.append(("slid", "f8", (LANES,)))  # N, see friction_force
+    if features.resistance:
+        # of springs rad, how far it has been turned; of impulses N m, the torque of the last step
+        fields.append(("twist", "f8", (3, LANES)))
     if features.box:
         fields.append(("face", "f8", (LANES,)))  # by which it came into a box, see box_distance
     if features.particles:

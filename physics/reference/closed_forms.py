@@ -39,6 +39,16 @@ def rolling_time(speed: float, friction: float, gravity: float) -> float:
     return 2.0 * speed / (7.0 * friction * gravity)
 
 
+def rolling_distance(speed: float, length: float, radius: float, gravity: float) -> float:
+    """Way in m in which a solid ball rolls to rest: resistance slows it by 5/7 g length/radius."""
+    return speed**2 / (2.0 * 5.0 / 7.0 * gravity * length / radius)
+
+
+def spinning_time(spin: float, length: float, radius: float, gravity: float) -> float:
+    """Time in s in which a solid ball that spins about the vertical comes to rest."""
+    return 0.4 * radius**2 * spin / (length * gravity)
+
+
 def contact_period(mass: float, stiffness: float) -> float:
     """Time in s that an undamped contact lasts: half a period of the spring."""
     return math.pi * math.sqrt(mass / stiffness)

@@ -21,7 +21,8 @@ from physics.stages.surfaces import box_distance, capsule_distance, sphere_dista
 @cache
 def make_search(features):
     """Kernels that make the list of candidates of one side anew, and clear a slot, in one lane."""
-    friction, impulse = features.friction, features.impulse
+    friction = features.friction and not features.viscous  # what it remembers
+    impulse, resistance = features.impulse, features.resistance
     sphere, box, capsule = features.sphere, features.box, features.capsule
     particles = features.particles
 
@@ -58,6 +59,8 @@ def make_search(features):
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
             if friction and impulse:
                 row.pull[axis, i] = old[cursor].pull[axis] if known else 0.0
+            if resistance:
+                row.twist[axis, i] = old[cursor].twist[axis] if known else 0.0
         if box:
             row.face[i] = old[cursor].face if known else 0.0
         return cursor
@@ -76,6 +79,8 @@ def make_search(features):
                 memory.shear[axis] = row.shear[axis, i]
             if friction and impulse:
                 memory.pull[axis] = row.pull[axis, i]
+            if resistance:
+                memory.twist[axis] = row.twist[axis, i]
         if box:
             memory.face = row.face[i]
 
@@ -96,6 +101,8 @@ def make_search(features):
                 row.shear[axis, i] = 0.0
             if friction and impulse:
                 row.pull[axis, i] = 0.0
+            if resistance:
+                row.twist[axis, i] = 0.0
             if particles:
                 row.partner[axis, i] = 0.0
 

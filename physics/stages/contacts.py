@@ -13,7 +13,7 @@ import numpy as np
 from physics.group import note_touch
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
-from physics.stages.friction import friction_force
+from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.relative import relative_motion, relative_pose
@@ -38,7 +38,8 @@ def make_loop(features, kind, report):
 
     With `report` it also writes a row for each candidate, in the surface's frame.
     """
-    friction = features.friction
+    viscous, resistance = features.viscous, features.resistance
+    friction = features.friction and not viscous
     normal_force = dashpot_force if features.dashpot else overlap_force
     plane, box = kind == PLANE, kind == BOX
     touch = make_touch(kind)
@@ -53,6 +54,8 @@ def make_loop(features, kind, report):
         shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
         mu, inverse_mass = constants.friction, 1.0 / constants.pair_mass
         sharp = constants.sharp != 0
+        rolling, spinning = constants.rolling, constants.spinning
+        twist_k, twist_c = constants.twist_stiffness, constants.twist_damping
         mass_rate = constants.pair_mass / h if h > 0.0 else 0.0
         for n in range(slots):
             row = candidate[n]
@@ -124,6 +127,42 @@ def make_loop(features, kind, report):
                     row.slid[i] = slid if lasts else row.slid[i]
                     row.shear[0, i] = sx if lasts else row.shear[0, i]
                     row.shear[1, i] = sy if lasts else row.shear[1, i]
+                if viscous:
+                    gx, gy, gz = viscous_force(
+                        normal,
+                        ux + approach * nx,
+                        uy + approach * ny,
+                        uz + approach * nz,
+                        shear_c,
+                        mu,
+                    )
+                    fx += gx
+                    fy += gy
+                    fz += gz
+                if resistance:
+                    tx, ty, tz, sx, sy, sz = twist_torque(
+                        normal,
+                        omega[0, i],
+                        omega[1, i],
+                        omega[2, i],
+                        nx,
+                        ny,
+                        nz,
+                        twist_k,
+                        twist_c,
+                        rolling,
+                        spinning,
+                        h,
+                        row.twist[0, i],
+                        row.twist[1, i],
+                        row.twist[2, i],
+                    )
+                    row.twist[0, i] = sx if lasts else row.twist[0, i]
+                    row.twist[1, i] = sy if lasts else row.twist[1, i]
+                    row.twist[2, i] = sz if lasts else row.twist[2, i]
+                    torque[0, i] += tx * weight if weight > 0.0 else 0.0
+                    torque[1, i] += ty * weight if weight > 0.0 else 0.0
+                    torque[2, i] += tz * weight if weight > 0.0 else 0.0
                 fx = fx * weight if weight > 0.0 else 0.0
                 fy = fy * weight if weight > 0.0 else 0.0
                 fz = fz * weight if weight > 0.0 else 0.0

@@ -18,6 +18,12 @@ agree, in the mean over where in a step sliding ends, if
 which `tangential_coefficients` solves for c: near 1/sqrt(2) of critical damping. What is left is a
 length of at most a dt^2 / 8, and for a box that lies on another than its widest face, that face's
 share of rocking (`python -m benchmarks.accuracy`).
+
+Resistance against rolling and spinning is the same law for the relative spin across the normal and
+along it, with torques up to a length times the normal force: a rolling ball slows by 5/7 g c/R.
+
+Viscous friction, the lecture's f = -eta v, is kept within the cone too. It has no memory and so
+holds nothing still; that makes it the cheapest.
 """
 
 import math
@@ -90,3 +96,53 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, slid):
     sy = back * (fy + c * uy) if held else 0.0
     sz = back * (fz + c * uz) if held else 0.0
     return fx, fy, fz, sx, sy, sz, normal if trial > limit else 0.0
+
+
+@stage
+def viscous_force(normal, ux, uy, uz, c, mu):
+    """Tangential force x y z in N against a slip in m/s; c in N s/m."""
+    speed = math.sqrt(ux * ux + uy * uy + uz * uz + 1e-60)
+    share = -min(c, mu * normal / speed)
+    return share * ux, share * uy, share * uz
+
+
+@stage
+def twist_torque(normal, wx, wy, wz, nx, ny, nz, k, c, rolling, spinning, h, tx, ty, tz):
+    """Torque against relative spin, of a sample with the whole pair's stiffness.
+
+    Args:
+        normal: N, the normal force.
+        wx: rad/s, relative spin.
+        wy: likewise.
+        wz: likewise.
+        nx: of the normal.
+        ny: likewise.
+        nz: likewise.
+        k: N m, stiffness.
+        c: N m s, damping.
+        rolling: m, of the resistance.
+        spinning: m, likewise.
+        h: s.
+        tx: rad, twist before this step.
+        ty: likewise.
+        tz: likewise.
+
+    Returns:
+        Torque x y z in N m and twist x y z in rad.
+    """
+    spin, twist = wx * nx + wy * ny + wz * nz, tx * nx + ty * ny + tz * nz
+    ax, ay, az, px, py, pz, _ = friction_force(
+        normal, wx - spin * nx, wy - spin * ny, wz - spin * nz, k, c, rolling, h,
+        tx - twist * nx, ty - twist * ny, tz - twist * nz, 0.0,
+    )  # fmt: skip
+    along, _, _, turn, _, _, _ = friction_force(
+        normal, spin, 0.0, 0.0, k, c, spinning, h, twist, 0.0, 0.0, 0.0
+    )
+    return (
+        ax + along * nx,
+        ay + along * ny,
+        az + along * nz,
+        px + turn * nx,
+        py + turn * ny,
+        pz + turn * nz,
+    )

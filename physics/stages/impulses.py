@@ -19,7 +19,7 @@ stiffness would, load / k. The speed at which overlap is pushed apart is limited
 Friction is rigid: it takes what speed across the contact remains, up to mu times the impulse along
 it. An anchor remembers how far the point has crept since it came to stick, and pulls it back. The
 mass across is the least in any direction, so that the step stays a descent of the energy that the
-cone can't turn into an ascent.
+cone can't turn into an ascent. Resistance against rolling and spinning is the same for the spin.
 """
 
 import math
@@ -29,7 +29,7 @@ from physics.group import note_touch
 from physics.jit import LANES, kernel, stage
 from physics.stages.impacts import make_impacts
 from physics.stages.kinematics import turned_back
-from physics.stages.points import cross, ends, give, make_points, place_tensors, slip, times
+from physics.stages.points import cross, ends, give, make_points, place_tensors, slip, times, turn
 
 # m/s at which overlaps are pushed apart at most
 PUSH_SPEED = 1.0
@@ -37,16 +37,42 @@ PUSH_SPEED = 1.0
 ANCHOR = 5.0
 
 
+@stage
+def resist(owner, surface, A, B, point, i, push, rolling, spinning):
+    """Corrects the angular impulse of a point against relative spin."""
+    nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+    # the least moment of inertia, by the largest row sum of its inverse
+    xx, yy, zz = A[0, i] + B[0, i], A[1, i] + B[1, i], A[2, i] + B[2, i]
+    xy, xz, yz = abs(A[3, i] + B[3, i]), abs(A[4, i] + B[4, i]), abs(A[5, i] + B[5, i])
+    inertia = 1.0 / max(max(xx + xy + xz, xy + yy + yz), max(xz + yz + zz, 1e-300))
+    wx = owner.spin[0, i] - surface.spin[0, i]
+    wy = owner.spin[1, i] - surface.spin[1, i]
+    wz = owner.spin[2, i] - surface.spin[2, i]
+    px, py, pz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
+    qx, qy, qz = px - inertia * wx, py - inertia * wy, pz - inertia * wz
+    along = qx * nx + qy * ny + qz * nz
+    qx, qy, qz = qx - along * nx, qy - along * ny, qz - along * nz
+    along = min(max(along, -spinning * push), spinning * push)
+    size = math.sqrt(qx * qx + qy * qy + qz * qz)
+    cut = rolling * push / size if size > rolling * push else 1.0
+    qx, qy, qz = cut * qx + along * nx, cut * qy + along * ny, cut * qz + along * nz
+    point.twist[0, i] = qx
+    point.twist[1, i] = qy
+    point.twist[2, i] = qz
+    turn(owner, surface, A, B, i, qx - px, qy - py, qz - pz)
+
+
 @cache
 def make_sweep(features):
     """Kernel that corrects the impulses of one side's points, one after another."""
-    friction = features.friction
+    friction, resistance = features.friction, features.resistance
 
     @kernel
     def sweep(points, owner, surface, A, B, ma, mb, constants, h, soft):
         """`soft`: with the bias that pushes overlaps apart, and the softness that goes with it."""
         mu, bounces, floor = constants.friction, constants.restitution > 0.0, constants.rest_speed
         K, C = constants.stiffness, constants.damping
+        rolling, spinning = constants.rolling, constants.spinning
         rate, per_h = K / (C + h * K), 1.0 / h
         for n in range(points.shape[0]):
             point = points[n]
@@ -98,6 +124,8 @@ def make_sweep(features):
                         point.anchor[1, i] = point.anchor[1, i] if holds else 0.0
                         point.anchor[2, i] = point.anchor[2, i] if holds else 0.0
                     give(owner, surface, A, B, ma, mb, point, i, qx - px, qy - py, qz - pz)
+                if resistance:
+                    resist(owner, surface, A, B, point, i, new, rolling, spinning)
 
     return sweep
 
@@ -105,7 +133,7 @@ def make_sweep(features):
 @cache
 def make_warm(features):
     """Kernel that gives the impulses of the last substep anew, and books what relaxing gave."""
-    friction = features.friction
+    friction, resistance = features.friction, features.resistance
 
     @kernel
     def warm(points, owner, surface, A, B, ma, mb):
@@ -126,6 +154,12 @@ def make_warm(features):
                 point.spent[1, i] += py
                 point.spent[2, i] += pz
                 give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
+                if resistance:
+                    tx, ty, tz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
+                    point.turned[0, i] += tx
+                    point.turned[1, i] += ty
+                    point.turned[2, i] += tz
+                    turn(owner, surface, A, B, i, tx, ty, tz)
 
     return warm
 
@@ -133,7 +167,7 @@ def make_warm(features):
 @cache
 def make_book(features):
     """Kernel that adds the forces of one side's points, and keeps what they remember."""
-    friction = features.friction
+    friction, resistance = features.friction, features.resistance
 
     @kernel
     def book(points, candidate, owner, surface, keeps, h, pressed):
@@ -163,6 +197,21 @@ def make_book(features):
                     row.shear[0, i] = sx if keeps[i] != 0 else row.shear[0, i]
                     row.shear[1, i] = sy if keeps[i] != 0 else row.shear[1, i]
                     row.shear[2, i] = sz if keeps[i] != 0 else row.shear[2, i]
+                if resistance:
+                    tx, ty, tz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
+                    px, py, pz = turned_back(Q, i, per_h * tx, per_h * ty, per_h * tz)
+                    row.twist[0, i] = px if keeps[i] != 0 else row.twist[0, i]
+                    row.twist[1, i] = py if keeps[i] != 0 else row.twist[1, i]
+                    row.twist[2, i] = pz if keeps[i] != 0 else row.twist[2, i]
+                    tx = per_h * (tx + point.turned[0, i])
+                    ty = per_h * (ty + point.turned[1, i])
+                    tz = per_h * (tz + point.turned[2, i])
+                    T[0, i] += tx
+                    T[1, i] += ty
+                    T[2, i] += tz
+                    U[0, i] -= tx
+                    U[1, i] -= ty
+                    U[2, i] -= tz
                 fx *= per_h
                 fy *= per_h
                 fz *= per_h

@@ -14,7 +14,7 @@ from physics.stages.kinematics import turned
 from physics.stages.points import cross
 
 # normals of the same face agree better than this
-_ALIKE = 0.9
+_ALIKE = 0.99
 # shares of the skin by which a point must lie deeper to be chosen for that alone, and of the
 # largest area that a triangle must have to count
 _DEEPER, _FLAT = 0.1, 0.05
@@ -56,11 +56,11 @@ def _area(a, b, c, normal):
 
 
 @kernel
-def _farthest(near, n, x, y, z):
+def _farthest(near, n, group, x, y, z):
     """Index of the group's point farthest from a place, and the square of the distance."""
     best, far = 0, -1.0
     for j in range(n):
-        if near[j].group:
+        if near[j].group == group:
             dx, dy, dz = near[j].position[0] - x, near[j].position[1] - y, near[j].position[2] - z
             square = dx * dx + dy * dy + dz * dz
             # twins that lie together must not take turns
@@ -70,49 +70,68 @@ def _farthest(near, n, x, y, z):
 
 
 @kernel
-def mark(near, n, skin):
-    """Leaves at most four of a face's candidates chosen; returns how many its group has had."""
-    deepest = 0
-    for j in range(n):
-        if near[j].gap < near[deepest].gap:
-            deepest = j
-    normal = near[deepest].normal
-    members, x, y, z = 0, 0.0, 0.0, 0.0
-    for j in range(n):
-        other = near[j].normal
-        alike = normal[0] * other[0] + normal[1] * other[1] + normal[2] * other[2] > _ALIKE
-        near[j].group = 1 if alike else 0
-        if alike:
-            members += 1
-            x += near[j].position[0]
-            y += near[j].position[1]
-            z += near[j].position[2]
-    if members <= 4:
-        return 0
-    first, far = _farthest(near, n, x / members, y / members, z / members)
+def _span(near, n, group, deepest, skin, x, y, z):
+    """Four of a group whose middle is x y z, or fewer if they lie in line; -1 for none."""
+    first, far = _farthest(near, n, group, x, y, z)
     if near[deepest].gap < near[first].gap - _DEEPER * skin:
         first = deepest
-    p = near[first].position
-    second, far = _farthest(near, n, p[0], p[1], p[2])
+    p, normal = near[first].position, near[deepest].normal
+    second, far = _farthest(near, n, group, p[0], p[1], p[2])
     least = _FLAT * far
     third, fourth, most, fewest = -1, -1, least, -least
     for j in range(n):
-        if near[j].group:
+        if near[j].group == group:
             area = _area(near[first], near[second], near[j], normal)
             if area > most * (1.0 + 1e-6):
                 third, most = j, area
             if area < fewest * (1.0 + 1e-6):
                 fourth, fewest = j, area
+    return first, second, third, fourth
+
+
+@kernel
+def thin_group(near, n, group, skin):
+    """Gathers the deepest candidate without a group and its like, and leaves four of them chosen.
+
+    Returns:
+        False if all candidates have a group.
+    """
+    deepest = -1
     for j in range(n):
-        if near[j].group:
-            near[j].chosen = 1 if j in (first, second, third, fourth) else 0
-    return members
+        if near[j].group == 0 and (deepest < 0 or near[j].gap < near[deepest].gap):
+            deepest = j
+    if deepest < 0:
+        return False
+    normal = near[deepest].normal
+    members, weight, x, y, z = 0, 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        other = near[j].normal
+        alike = normal[0] * other[0] + normal[1] * other[1] + normal[2] * other[2] > _ALIKE
+        if near[j].group == 0 and (alike or j == deepest):
+            near[j].group = group
+            members += 1
+            weight += near[j].weight
+            x += near[j].position[0]
+            y += near[j].position[1]
+            z += near[j].position[2]
+    if members <= 4:
+        return True
+    four = _span(near, n, group, deepest, skin, x / members, y / members, z / members)
+    chosen = 0
+    for j in range(n):
+        if near[j].group == group:
+            near[j].chosen = 1 if j in four else 0
+            chosen += near[j].chosen
+    for j in range(n):
+        if near[j].group == group:
+            near[j].weight = weight / chosen
+    return True
 
 
 @cache
 def make_choose(features, clear):
     """Kernel that thins out the lists of one lane of a side and its mirror, just made."""
-    friction, box = features.friction, features.box
+    friction, box, resistance = features.friction, features.box, features.resistance
 
     @kernel
     def move(candidate, ids, i, source, target):
@@ -127,10 +146,12 @@ def make_choose(features, clear):
             if friction:
                 b.shear[axis, i] = a.shear[axis, i]
                 b.pull[axis, i] = a.pull[axis, i]
+            if resistance:
+                b.twist[axis, i] = a.twist[axis, i]
 
     @kernel
-    def thin(model, state, work, g, k, i, near, share):
-        """Drops what isn't chosen from a side's list, and gives the group its new weights."""
+    def drop(model, state, work, g, k, i, near):
+        """Drops what isn't chosen from a side's list, and gives the others their new weights."""
         first, count = model.side[k].first_slot, work.side[k].count[i]
         candidate = state.candidate[g, first : first + count]
         ids = state.sample_id[g, first : first + count]
@@ -139,8 +160,7 @@ def make_choose(features, clear):
             if near[n].chosen:
                 if kept != n:
                     move(candidate, ids, i, n, kept)
-                if near[n].group:
-                    candidate[kept].weight[i] = share
+                candidate[kept].weight[i] = near[n].weight
                 kept += 1
         for n in range(kept, count):
             clear(candidate[n], i)
@@ -157,16 +177,17 @@ def make_choose(features, clear):
             for axis in range(3):
                 near[j].normal[axis] = -near[j].normal[axis]
         n = count + others
-        if n <= 4 or mark(near, n, side.skin) == 0:
+        if n <= 4:
             return
-        total, chosen = 0.0, 0
         for j in range(n):
-            if near[j].group:
-                s, slot = (k, j) if j < count else (mirror, j - count)
-                total += state.candidate[g, model.side[s].first_slot + slot].weight[i]
-                chosen += near[j].chosen
-        thin(model, state, work, g, k, i, near[:count], total / chosen)
+            s, slot = (k, j) if j < count else (mirror, j - count)
+            near[j].weight = state.candidate[g, model.side[s].first_slot + slot].weight[i]
+            near[j].group = 0
+        group = 1
+        while thin_group(near, n, group, side.skin):
+            group += 1
+        drop(model, state, work, g, k, i, near[:count])
         if mirror >= 0:
-            thin(model, state, work, g, mirror, i, near[count:n], total / chosen)
+            drop(model, state, work, g, mirror, i, near[count:n])
 
     return choose

@@ -129,6 +129,19 @@ def slip(owner, surface, point, i):
 
 
 @stage
+def turn(owner, surface, A, B, i, tx, ty, tz):
+    """Gives the owner the angular impulse t [N m s], and the surface -t."""
+    sx, sy, sz = times(A, i, tx, ty, tz)
+    owner.spin[0, i] += sx
+    owner.spin[1, i] += sy
+    owner.spin[2, i] += sz
+    sx, sy, sz = times(B, i, tx, ty, tz)
+    surface.spin[0, i] -= sx
+    surface.spin[1, i] -= sy
+    surface.spin[2, i] -= sz
+
+
+@stage
 def inverse_mass(model, solid):
     """1/kg, of statics 0."""
     return model.mover[solid].inverse_mass if solid < model.mover.shape[0] else 0.0
@@ -151,7 +164,7 @@ def ends(model, work, k):
 @cache
 def make_place(features, kind):
     """Kernel that writes the points of a side against one kind of surface."""
-    friction = features.friction
+    friction, resistance = features.friction, features.resistance
     touch = make_touch(kind)
     box = kind == BOX
 
@@ -216,6 +229,14 @@ def make_place(features, kind):
                     point.anchor[0, i] = sx - along * nx if held else 0.0
                     point.anchor[1, i] = sy - along * ny if held else 0.0
                     point.anchor[2, i] = sz - along * nz if held else 0.0
+                if resistance:
+                    px, py, pz = turned(Q, i, row.twist[0, i], row.twist[1, i], row.twist[2, i])
+                    point.twist[0, i] = h * px
+                    point.twist[1, i] = h * py
+                    point.twist[2, i] = h * pz
+                    point.turned[0, i] = -h * px
+                    point.turned[1, i] = -h * py
+                    point.turned[2, i] = -h * pz
                 # this step gives what it ends with, less what the last one did
                 point.spent[0, i] = -gx
                 point.spent[1, i] = -gy
