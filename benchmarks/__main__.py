@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from benchmarks import accuracy, features, memory, speed, startup
+from benchmarks import accuracy, features, memory, speed, startup, tradeoff
 from benchmarks.report import Table, circumstances, describe, plain
 from benchmarks.tables import RESULTS
 
@@ -16,6 +16,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Table]]] = {
     "memory": memory.measure,
     "accuracy": accuracy.measure,
     "features": features.measure,
+    "tradeoff": tradeoff.measure,
 }
 
 

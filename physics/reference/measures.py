@@ -1,0 +1,140 @@
+"""Errors against closed forms, for any engine that is read and written as a World is.
+
+Each measure makes its own scene, of bodies of 1 kg unless it says otherwise, and returns a figure
+that is zero for a perfect engine: relative, or in the unit that its docstring names.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from physics.fidelity import Fidelity
+from physics.reference import closed_forms
+from physics.reference.scenes import (
+    CUBE,
+    GRAVITY,
+    block_on_ground,
+    sphere_on_ground,
+    tower,
+)
+from physics.scene import Scene
+from physics.world import World
+
+Array = np.ndarray
+
+FRICTION = 0.5
+BLOCK = (0.05, 0.05, 0.05)  # m, half extents
+PHASES = 100
+IMPACT = 1.0  # m/s
+
+
+class Simulated(Protocol):
+    """What a measure asks of an engine."""
+
+    @property
+    def position(self) -> Array:
+        """[1, bodies, 3] m."""
+
+    @property
+    def linear_velocity(self) -> Array:
+        """[1, bodies, 3] m/s."""
+
+    def advance(self, time: float) -> None:
+        """Advances by `time` s."""
+
+    def set_state(self, *, linear_velocity: Any) -> None:
+        """Writes velocities in m/s."""
+
+
+Make = Callable[[Scene], Simulated]
+
+
+def slide(half_extents: tuple[float, float, float], speed: float, make: Make) -> float:
+    """Error of the distance in which a block slides to rest."""
+    world = make(block_on_ground(half_extents, FRICTION, mass=1.0))
+    world.advance(1.0)
+    start = float(world.position[0, 0, 0])
+    world.set_state(linear_velocity=(speed, 0.0, 0.0))
+    world.advance(1.2 * speed / (FRICTION * GRAVITY) + 0.2)
+    way = float(world.position[0, 0, 0]) - start
+    return abs(way / closed_forms.slide_distance(speed, FRICTION, GRAVITY) - 1.0)
+
+
+def creep(make: Make) -> float:
+    """Speed in m/s at which a cube creeps down 20 degrees, from the first second to the 60th."""
+    world = make(block_on_ground(BLOCK, FRICTION, angle=math.radians(20.0), mass=1.0))
+    world.advance(1.0)
+    start = world.position[0, 0].copy()
+    world.advance(59.0)
+    return math.dist(world.position[0, 0], start) / 59.0
+
+
+def acceleration(degrees: float, second: int, make: Make) -> float:
+    """Error of the speed that a cube gains down a slope in its first or second second.
+
+    In the first it lands: the force on it takes a few milliseconds to build up.
+    """
+    angle = math.radians(degrees)
+    world = make(block_on_ground(BLOCK, FRICTION, angle=angle, mass=1.0))
+    speed = [0.0]
+    for _ in range(2):
+        world.advance(1.0)
+        speed.append(float(world.linear_velocity[0, 0, 0]))
+    gained = speed[second] - speed[second - 1]
+    return abs(gained / closed_forms.incline_acceleration(angle, FRICTION, GRAVITY) - 1.0)
+
+
+def roll(make: Make) -> float:
+    """Error of the speed at which a ball rolls that was set off sliding at 1 m/s."""
+    world = make(sphere_on_ground(0.05, FRICTION, mass=1.0))
+    world.advance(1.0)
+    world.set_state(linear_velocity=(1.0, 0.0, 0.0))
+    world.advance(1.5 * closed_forms.rolling_time(1.0, FRICTION, GRAVITY) + 0.1)
+    return abs(float(world.linear_velocity[0, 0, 0]) / closed_forms.rolling_speed(1.0) - 1.0)
+
+
+def rebounds(restitution: float, fidelity: Fidelity) -> Array:
+    """Speeds after over before an impact, [PHASES], first touch spread evenly over a substep."""
+    scene = sphere_on_ground(0.05, friction=0.0, restitution=restitution, gravity=0.0)
+    world = World(scene, fidelity, count=PHASES, threads=1)
+    height = 0.055 + IMPACT * fidelity.substep * np.arange(PHASES) / PHASES
+    position = np.stack([0.0 * height, 0.0 * height, height], axis=-1)[:, None]
+    world.set_state(position=position, linear_velocity=(0.0, 0.0, -IMPACT))
+    world.advance(1.0)
+    return world.linear_velocity[:, 0, 2] / IMPACT
+
+
+def oblique(friction: float, along: float, make: Make) -> float:
+    """Error of the speed along the ground of a ball that hits it at 1 m/s, e = 0.5, no gravity."""
+    scene = sphere_on_ground(
+        0.1, friction, 0.5, gravity=0.0, position=(0.0, 0.0, 0.11),
+        linear_velocity=(along, 0.0, -IMPACT), mass=1.0,
+    )  # fmt: skip
+    world = make(scene)
+    world.advance(0.2)
+    expected = closed_forms.oblique_impact(along, IMPACT, friction, 0.5, 0.1)[0]
+    return abs(float(world.linear_velocity[0, 0, 0]) / expected - 1.0)
+
+
+class Standing(NamedTuple):
+    """How a tower of 4 cm cubes stands: drift and lean in m, sink of the topmost in m."""
+
+    drift: float
+    lean: float
+    sink: float
+
+
+def stand(cubes: int, time: float, make: Make) -> Standing:
+    """Largest drift in `time` s after the first second, and lean and sink at its end."""
+    world = make(tower(cubes))
+    world.advance(1.0)
+    start = world.position[0].copy()
+    world.advance(time)
+    half = CUBE.half_extents[2]
+    return Standing(
+        drift=float(np.abs(world.position[0] - start).max()),
+        lean=float(np.abs(world.position[0, :, :2]).max()),
+        sink=(2 * cubes - 1) * half - float(world.position[0, -1, 2]),
+    )
