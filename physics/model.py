@@ -317,7 +317,8 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
     # a ball without friction is never turned, and one that doesn't spin needs no orientation
     inert = all(isinstance(b.shape, Sphere) and not any(b.angular_velocity) for b in scene.bodies)
     moments = model.mover["inertia"][: len(scene.bodies)]
-    isotropic = bool(np.all(moments == moments[:, :1]))
+    # impulses need every body's tensor in the world frame anyway
+    isotropic = bool(np.all(moments == moments[:, :1])) and not impulse
     resistance = bool(np.any(model.side["rolling"] + model.side["spinning"] > 0.0))
     rotation = (
         NO_ROTATION

@@ -16,6 +16,7 @@ from physics.reference.scenes import (
     CUBE,
     GRAVITY,
     block_on_ground,
+    dominoes,
     sphere_on_ground,
     tower,
 )
@@ -138,3 +139,12 @@ def stand(cubes: int, time: float, make: Make) -> Standing:
         lean=float(np.abs(world.position[0, :, :2]).max()),
         sink=(2 * cubes - 1) * half - float(world.position[0, -1, 2]),
     )
+
+
+def wave_speed(fidelity: str | Fidelity, stones: int = 12, gap: float = 0.03) -> float:
+    """Speed in m/s at which a row of dominoes falls, over its second half."""
+    world = World(dominoes(stones, gap), fidelity, threads=1)
+    world.advance(1.5)
+    touched = [float(world.first_touch(i, i + 1)[0]) for i in range(stones - 1)]
+    half = stones // 2
+    return gap * (stones - 2 - half) / (touched[-1] - touched[half])

@@ -118,6 +118,72 @@ def tower(cubes: int, jitter: float = 2e-4, seed: int = 0) -> Scene:
     return Scene(bodies, [Ground(material)])
 
 
+def pyramid(rows: int) -> Scene:
+    """Cubes of 64 g in a wall, each over the gap of 2 mm between two below it."""
+    width, material = 2.0 * CUBE.half_extents[2], Material(0.5, 0.0)
+    bodies = [
+        Body(
+            CUBE,
+            mass=0.064,
+            position=((i - (rows - row - 1) / 2) * 1.05 * width, 0.0, (row + 0.5) * width),
+            material=material,
+        )
+        for row in range(rows)
+        for i in range(rows - row)
+    ]
+    return Scene(bodies, [Ground(material)])
+
+
+def heavy_top(ratio: float) -> Scene:
+    """Two cubes, the upper one so many times denser than the lower one of 64 g."""
+    material = Material(0.5, 0.0)
+    bodies = [
+        Body(CUBE, mass=mass, position=(aside, 0.5 * aside, height), material=material)
+        for mass, aside, height in ((0.064, 0.0, 0.02), (0.064 * ratio, 2e-4, 0.06))
+    ]
+    return Scene(bodies, [Ground(material)])
+
+
+def dominoes(count: int, gap: float = 0.03) -> Scene:
+    """Stones of 8 by 24 by 50 mm, `gap` m from centre to centre, the first one toppling."""
+    half = (0.004, 0.012, 0.025)
+    stone, ground = Material(0.3, 0.0), Material(0.6, 0.0)
+    first: dict[str, Any] = {
+        "angular_velocity": (0.0, 3.0, 0.0),
+        "linear_velocity": (3.0 * half[2], 0.0, 0.0),
+    }
+    bodies = [
+        Body(
+            Box(half),
+            mass=0.02,
+            position=(gap * i, 0.0, half[2]),
+            material=stone,
+            **(first if i == 0 else {}),
+        )
+        for i in range(count)
+    ]
+    return Scene(bodies, [Ground(ground)])
+
+
+def leaning_cards(angle: float) -> Scene:
+    """Two cards of 2 by 60 by 90 mm that lean against each other, `angle` rad off the vertical."""
+    thick, half = 0.001, (0.001, 0.03, 0.045)
+    material = Material(0.6, 0.0)
+    height = half[2] * math.cos(angle) + thick * math.sin(angle)
+    aside = half[2] * math.sin(angle) + thick * math.cos(angle)
+    bodies = [
+        Body(
+            Box(half),
+            mass=0.002,
+            position=(way * (aside + 1e-6), 0.0, height),
+            orientation=(0.0, -way * math.sin(angle / 2), 0.0, math.cos(angle / 2)),
+            material=material,
+        )
+        for way in (-1.0, 1.0)
+    ]
+    return Scene(bodies, [Ground(material)])
+
+
 def torque_free_box(
     angular_velocity: Vector = (3.0, 0.0, 5.0),
     half_extents: tuple[float, float, float] = (0.03, 0.02, 0.01),

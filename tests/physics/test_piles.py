@@ -1,0 +1,68 @@
+"""Piles that ask more of contacts than one body on the ground does."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from physics import PRESETS, Fidelity, World
+from physics.reference import scenes
+from physics.reference.measures import wave_speed
+from physics.reference.scenes import settled
+
+SOLID = PRESETS["solid"]
+
+
+def drift(world, time):
+    """How far any body moves in `time` s, m."""
+    start = world.position.copy()
+    world.advance(time)
+    return np.abs(world.position - start).max()
+
+
+def test_a_pyramid_of_ten_rows_stands():
+    world = settled(scenes.pyramid(10), SOLID)
+    assert drift(world, 5.0) < 1e-3
+    assert world.position[0, -1, 2] > 0.38 - 0.002
+
+
+@pytest.mark.parametrize(
+    ("ratio", "fidelity"),
+    [(10.0, SOLID), (100.0, replace(SOLID, substep=0.5e-3)), (300.0, Fidelity(substep=0.1e-3))],
+)
+def test_a_cube_carries_one_many_times_as_dense(ratio, fidelity):
+    world = settled(scenes.heavy_top(ratio), fidelity)
+    assert drift(world, 5.0) < 1e-3
+    assert world.position[0, 1, 2] > 0.058
+
+
+def test_the_wave_along_dominoes_converges_with_the_step():
+    speeds = [wave_speed(Fidelity(substep=h), stones=20) for h in (2e-3, 1e-3, 0.5e-3, 0.25e-3)]
+    errors = [abs(v / speeds[-1] - 1.0) for v in speeds[:-1]]
+    assert errors[0] < 0.2
+    assert max(errors[1:]) < 0.03
+    assert 0.8 < speeds[-1] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "fidelity"),
+    [(10.0, "balanced"), (20.0, "balanced"), (20.0, "solid"), (25.0, "solid")],
+)
+def test_two_cards_lean_against_each_other(degrees, fidelity):
+    world = settled(scenes.leaning_cards(math.radians(degrees)), fidelity)
+    assert drift(world, 10.0) < 1e-4
+    assert world.position[0, 0, 2] > 0.04
+
+
+def test_the_whole_is_no_deeper_than_its_stiffness_says():
+    """Each of a tower's contacts carries what is above it, four points at a quarter each."""
+    world = World(scenes.tower(3, jitter=0.0), SOLID)
+    world.advance(3.0)
+    told = world.contacts()
+    pairs = np.sort(told.pair, axis=-1)
+    for below, above in ((0, 1), (1, 2)):
+        here = np.all(pairs == (below, above), axis=-1)
+        force = np.abs(told.force[here, 2]).sum()
+        assert here.sum() == 4
+        assert force == pytest.approx(0.064 * scenes.GRAVITY * (3 - above), rel=1e-3)

@@ -1,0 +1,112 @@
+"""The largest stable step is where theory says: the step is swept across it, from 0.02 on."""
+
+import math
+
+import numpy as np
+import pytest
+
+from physics import (
+    PRESETS,
+    Body,
+    Box,
+    Capsule,
+    Drive,
+    Fidelity,
+    Ground,
+    Material,
+    Scene,
+    SimulationDiverged,
+    Sphere,
+    World,
+)
+from physics.reference import scenes
+
+LYING = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
+
+
+def scene(kind):
+    """Bodies whose contacts have a given stiffness, and so a largest step."""
+    material = Material(0.5, 0.5, stiffness=2e4)
+    cube = scenes.CUBE
+    bodies = {
+        "ball": [(Sphere(0.02), 0.1, 0.02)],
+        "cube": [(cube, 0.1, 0.02)],
+        "capsule": [(Capsule(0.02, 0.03), 0.1, 0.02)],
+        "light on heavy": [(cube, 1.0, 0.02), (cube, 0.05, 0.06)],
+    }[kind]
+    turn = LYING if kind == "capsule" else (0, 0, 0, 1)
+    return Scene(
+        [
+            Body(shape, mass=mass, position=(0, 0, z), orientation=turn, material=material)
+            for shape, mass, z in bodies
+        ],
+        [Ground(material)],
+    )
+
+
+def at_rest(world, start):
+    """Puts a world into the state of one at rest."""
+    shape = (world.count, *start.position.shape[1:])
+    world.set_state(
+        position=np.broadcast_to(start.position, shape),
+        orientation=np.broadcast_to(start.orientation, (*shape[:2], 4)),
+    )
+
+
+def predicted(some, damping, start):
+    """Largest stable step in s; friction's damping depends on the step, so it is a fixed point."""
+    step = 1e-3
+    for _ in range(6):
+        world = World(some, Fidelity(substep=step, damping=damping), allow_unstable=True)
+        at_rest(world, start)
+        step = world.largest_stable_step()
+    return step
+
+
+def runs_away(some, damping, start, step):
+    """Whether slight disturbances of rest don't die out."""
+    rng = np.random.default_rng(0)
+    fidelity = Fidelity(substep=step, damping=damping)
+    world = World(some, fidelity, count=8, allow_unstable=True)
+    at_rest(world, start)
+    shape = (8, len(some.bodies), 3)
+    world.set_state(
+        linear_velocity=1e-7 * rng.normal(size=shape),
+        angular_velocity=5e-6 * rng.normal(size=shape),
+    )
+    try:
+        world.advance(300 * step)
+    except SimulationDiverged:
+        return True
+    return not world.kinetic_energy().max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("kind", "damping"),
+    [
+        ("ball", "overlap"),
+        ("cube", "overlap"),
+        ("cube", "dashpot"),
+        ("capsule", "overlap"),
+        ("light on heavy", "overlap"),
+    ],
+)
+def test_the_largest_stable_step_is_predicted_within_a_tenth(kind, damping):
+    some = scene(kind)
+    start = World(some, Fidelity(substep=2e-5, damping=damping), allow_unstable=True)
+    start.advance(1.0)
+    limit = predicted(some, damping, start)
+    for share in (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9):
+        assert not runs_away(some, damping, start, share * limit), share
+    for share in (1.1, 1.2):
+        assert runs_away(some, damping, start, share * limit), share
+
+
+def test_impulses_have_no_largest_step_but_that_of_a_servo():
+    world = World(scenes.block_on_ground(stiffness=1e9), PRESETS["solid"])
+    world.advance(1.0)
+    assert world.largest_stable_step() == math.inf
+    assert np.abs(world.linear_velocity).max() < 1e-5
+    tool = Drive(Sphere(0.02), 0.1, 10.0, (0, 0, 0.1), frequency=2e3)
+    with pytest.raises(ValueError, match=r"Drive\.frequency 2000 rad/s .*largest safe step"):
+        World(Scene([Body(Box((0.02,) * 3), mass=0.1)], [Ground()], [tool]), "solid")
