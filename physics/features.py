@@ -14,7 +14,6 @@ class Features(NamedTuple):
 
     Attributes:
         impulse: the impulse law in place of the spring law.
-        restitution: of the impulse law: any pair bounces.
         dashpot: linear damping in place of the one continuous in overlap.
         friction: any pair has friction: tangential law and history.
         viscous: friction without history.
@@ -25,7 +24,6 @@ class Features(NamedTuple):
     """
 
     impulse: bool
-    restitution: bool
     dashpot: bool
     friction: bool
     viscous: bool

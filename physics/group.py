@@ -92,7 +92,7 @@ POINT = np.dtype(
         ("turned", "f8", (3, LANES)),  # N m s given in this step beyond twist
         ("anchor", "f8", (3, LANES)),  # m, how far the point has left where it came to stick
         ("spent", "f8", (3, LANES)),  # N s given in this step beyond push and pull
-        ("bounce", "f8", (LANES,)),  # restitution of an instantaneous collision, 0 if none
+        ("bounce", "f8", (LANES,)),  # restitution of an instantaneous collision, -1 if none
         ("hit", "f8", (LANES,)),  # N s along the normal, of that collision
         ("skid", "f8", (3, LANES)),  # N s across it, likewise
     ],

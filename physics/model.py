@@ -329,7 +329,6 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
     )
     return Features(
         impulse=impulse,
-        restitution=impulse and bool(np.any(model.side["restitution"] > 0.0)),
         dashpot=not impulse and fidelity.damping == "dashpot" and len(model.side) > 0,
         friction=friction,
         viscous=friction and fidelity.friction == "viscous",

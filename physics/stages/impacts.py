@@ -28,7 +28,7 @@ SMALL, ROUNDS = 1e-6, 64
 
 @kernel
 def find(points, owner, surface, constants, h, struck, speed):
-    """Notes the restitution of each point that collides, and which lanes have one."""
+    """Notes the restitution of each point that collides, -1 of others, and which lanes have one."""
     e, floor = constants.restitution, constants.rest_speed
     for n in range(points.shape[0]):
         point = points[n]
@@ -38,13 +38,12 @@ def find(points, owner, surface, constants, h, struck, speed):
             un = ux * nx + uy * ny + uz * nz
             collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= 0.0)
             collides = collides & (point.weight[i] > 0.0)
-            bounce = e if collides else 0.0
-            point.bounce[i] = bounce
+            point.bounce[i] = e if collides else -1.0
             point.hit[i] = 0.0
             for axis in range(3):
                 point.skid[axis, i] = 0.0
-            struck[i] = 1 if bounce > 0.0 else struck[i]
-            speed[i] = max(speed[i], -un) if bounce > 0.0 else speed[i]
+            struck[i] = 1 if collides else struck[i]
+            speed[i] = max(speed[i], -un) if collides else speed[i]
 
 
 @cache
@@ -58,7 +57,7 @@ def make_press(features):
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
-                part = (point.gap[i] <= 0.0) | (point.bounce[i] > 0.0)
+                part = (point.gap[i] <= 0.0) | (point.bounce[i] >= 0.0)
                 part = part & (point.weight[i] > 0.0) & (going[i] != 0)
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 ux, uy, uz = slip(owner, surface, point, i)
@@ -102,7 +101,7 @@ def give_back(points, owner, surface, A, B, ma, mb, share, again):
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
-            e = point.bounce[i]
+            e = max(point.bounce[i], 0.0)
             compression = point.hit[i] / (1.0 + e) if again else point.hit[i]
             step = (share[i] - 1.0) * e * compression if again else e * compression
             point.hit[i] += step

@@ -70,7 +70,7 @@ def make_sweep(features):
     @kernel
     def sweep(points, owner, surface, A, B, ma, mb, constants, h, soft):
         """`soft`: with the bias that pushes overlaps apart, and the softness that goes with it."""
-        mu, bounces, floor = constants.friction, constants.restitution > 0.0, constants.rest_speed
+        mu, floor = constants.friction, constants.rest_speed
         K, C = constants.stiffness, constants.damping
         rolling, spinning = constants.rolling, constants.spinning
         rate, per_h = K / (C + h * K), 1.0 / h
@@ -90,9 +90,8 @@ def make_sweep(features):
                     leak = m / (m + a) if yielding else 0.0
                     mass = a * leak if yielding else m
                     bias = max(rate * gap, -PUSH_SPEED) if yielding else bias
-                # what will bounce must arrive at its full speed
-                if bounces:
-                    bias = -un if ahead & (un < -floor) else bias
+                # what will collide must arrive at its full speed
+                bias = -un if ahead & (un < -floor) else bias
                 new = max(push - mass * (un + bias) - leak * push, 0.0)
                 new = new if weight > 0.0 else 0.0
                 step = new - push
@@ -260,7 +259,6 @@ def make_impulses(features):
     """Stage that adds the contact forces of all sides, and notes first touches."""
     points, impacts = make_points(features), make_impacts(features)
     sweep, warm, book = make_sweep(features), make_warm(features), make_book(features)
-    restitution = features.restitution
 
     @kernel
     def correct(model, work, h, soft):
@@ -293,8 +291,7 @@ def make_impulses(features):
         for k in range(sides):
             if work.side[k].slots > 0:
                 points(model, state, work, g, k, work.lane[0].keeps, h)
-        if restitution:
-            impacts(model, work, h)
+        impacts(model, work, h)
         correct(model, work, h, False)
         outside(model, work, h)
         for k in range(sides):

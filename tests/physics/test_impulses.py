@@ -19,7 +19,7 @@ PHASES = 100
 # --- instantaneous collisions -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75, 1.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.25, 0.5, 0.75, 1.0])
 def test_restitution_is_exact_at_every_phase_of_touch(restitution):
     scene = scenes.sphere_on_ground(
         friction=0.5, restitution=restitution, gravity=0.0, linear_velocity=(0, 0, -1.0)
@@ -46,6 +46,14 @@ def test_an_oblique_impact_slides_or_sticks_as_coulomb_says(friction, along):
     # found while they overlap, which shortens the lever by half of that
     np.testing.assert_allclose(world.linear_velocity[0, 0], (x, 0.0, z), rtol=2e-3)
     np.testing.assert_allclose(world.angular_velocity[0, 0], (0.0, spin, 0.0), rtol=2e-3)
+
+
+def test_without_restitution_a_cube_stays_where_it_lands():
+    scene = scenes.block_on_ground(position=(0, 0, 0.05), linear_velocity=(0, 0, -1.0))
+    world = World(replace(scene, gravity=(0, 0, 0)), SOLID)
+    world.advance(0.5)
+    assert np.abs(world.linear_velocity).max() < 1e-5
+    assert world.position[0, 0, 2] == pytest.approx(0.02, abs=1e-5)
 
 
 @pytest.mark.parametrize("spacing", [1.0, 0.5, 0.25])
