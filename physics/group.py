@@ -57,7 +57,6 @@ REMEMBERED = np.dtype(
         ("shear", "f8", (3,)),
         ("pull", "f8", (3,)),
         ("twist", "f8", (3,)),
-        ("slid", "f8"),
         ("face", "f8"),
     ],
     align=True,

@@ -47,7 +47,9 @@ def _normal(side: Any, dashpot: bool, h: float) -> float:
     c = critical if damping > 0.0 else 0.0
     x = h * c / m
     phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
-    return (phi * (h * c + 0.5 * h * h * k) + 2.0 * m * (1.0 - phi)) / (2.0 - phi)
+    approaching = phi * h * c + 0.5 * h * h * k
+    parting = phi * (h * c + 0.5 * h * h * k) + (1.0 - phi) * (2.0 * m - approaching)
+    return 0.5 * (approaching + parting)
 
 
 def _across(side: Any, viscous: bool, h: float) -> float:

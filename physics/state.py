@@ -63,8 +63,6 @@ def candidate_dtype(features: Features) -> np.dtype:
         fields.append(("shear", "f8", (3, LANES)))  # m
         if features.impulse:
             fields.append(("pull", "f8", (3, LANES)))  # N, of friction, in the surface's frame
-        else:
-            fields.append(("slid", "f8", (LANES,)))  # N, see friction_force
     if features.resistance:
         # of springs rad, how far it has been turned; of impulses N m, the torque of the last step
         fields.append(("twist", "f8", (3, LANES)))

@@ -5,7 +5,7 @@ that is zero for a perfect engine: relative, or in the unit that its docstring n
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,7 +20,8 @@ from physics.reference.scenes import (
     sphere_on_ground,
     tower,
 )
-from physics.scene import Scene
+from physics.scene import Body, Ground, Material, Scene
+from physics.shapes import Shape
 from physics.world import World
 
 Array = np.ndarray
@@ -117,6 +118,55 @@ def oblique(friction: float, along: float, make: Make) -> float:
     world.advance(0.2)
     expected = closed_forms.oblique_impact(along, IMPACT, friction, 0.5, 0.1)[0]
     return abs(float(world.linear_velocity[0, 0, 0]) / expected - 1.0)
+
+
+def grazing(
+    shapes: Sequence[Shape],
+    restitution: float,
+    friction: float,
+    fidelity: str | Fidelity,
+    count: int = 1000,
+) -> World:
+    """Worlds of one body over the ground, or of two, on random paths that just meet.
+
+    Shapes of at most 4 cm; no gravity. All have met, or missed, within 0.3 s.
+    """
+    rng = np.random.default_rng(0)
+    material = Material(friction, restitution)
+    bodies = [
+        Body(shape, mass=0.1 * (i + 1), position=(0.2 * i, 0, 0.1), material=material)
+        for i, shape in enumerate(shapes)
+    ]
+    statics = [Ground(material)] if len(shapes) == 1 else []
+    world = World(Scene(bodies, statics, gravity=(0, 0, 0)), fidelity, count, threads=1)
+    velocity, position = np.zeros((2, count, len(shapes), 3))
+    if len(shapes) == 1:
+        heading = rng.uniform(0, 2 * np.pi, count)
+        down = rng.uniform(0, 1, count) ** 2
+        velocity[:, 0] = np.stack([np.cos(heading), np.sin(heading), -down], axis=-1)
+        position[:, 0, 2] = 0.05
+    else:
+        to = rng.normal(size=(count, 3))
+        to /= np.linalg.norm(to, axis=-1, keepdims=True)
+        aside = np.cross(to, rng.normal(size=(count, 3)))
+        aside *= rng.uniform(0, 0.06, (count, 1)) / np.linalg.norm(aside, axis=-1, keepdims=True)
+        velocity[:, 0], position[:, 0] = to, -0.09 * to + aside
+    world.set_state(
+        position=position, linear_velocity=velocity,
+        angular_velocity=rng.uniform(-20, 20, velocity.shape),
+        orientation=rng.normal(size=(count, len(shapes), 4)),
+    )  # fmt: skip
+    return world
+
+
+def energy_gain(world: World, time: float = 0.3) -> float:
+    """Largest share by which the kinetic energy of any world ever exceeds that at the start."""
+    before = world.kinetic_energy()
+    gain = -math.inf
+    for _ in range(15):
+        world.advance(time / 15)
+        gain = max(gain, float((world.kinetic_energy() / before).max()) - 1.0)
+    return gain
 
 
 class Standing(NamedTuple):

@@ -52,8 +52,6 @@ def make_search(features):
         row.load[i] = old[cursor].load if known else 0.0
         if not impulse:
             row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
-        if friction and not impulse:
-            row.slid[i] = old[cursor].slid if known else 0.0
         for axis in range(3):
             if friction:
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
@@ -72,8 +70,6 @@ def make_search(features):
         memory.load = row.load[i]
         if not impulse:
             memory.impact_speed = row.impact_speed[i]
-        if friction and not impulse:
-            memory.slid = row.slid[i]
         for axis in range(3):
             if friction:
                 memory.shear[axis] = row.shear[axis, i]
@@ -93,8 +89,6 @@ def make_search(features):
             row.impact_speed[i] = 0.0
         if box:
             row.face[i] = 0.0
-        if friction and not impulse:
-            row.slid[i] = 0.0
         for axis in range(3):
             row.sample[axis, i] = 0.0
             if friction:

@@ -13,7 +13,7 @@ import numpy as np
 from physics.group import note_touch
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
-from physics.stages.friction import friction_force, twist_torque, viscous_force
+from physics.stages.friction import friction_force, reach, twist_torque, viscous_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.relative import relative_motion, relative_pose
@@ -98,15 +98,16 @@ def make_loop(features, kind, report):
                     fx, fy, fz = normal * nx, normal * ny, normal * nz
                 if friction:
                     sx, sy, sz = row.shear[0, i], row.shear[1, i], row.shear[2, i]
+                    cones = reach(memory, floor)
                     if plane:
-                        gx, gy, gz, sx, sy, sz, slid = friction_force(
-                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, row.slid[i]
+                        gx, gy, gz, sx, sy, sz = friction_force(
+                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, cones
                         )
                         fx += gx
                         fy += gy
                     else:
                         along = sx * nx + sy * ny + sz * nz
-                        gx, gy, gz, sx, sy, sz, slid = friction_force(
+                        gx, gy, gz, sx, sy, sz = friction_force(
                             normal,
                             ux + approach * nx,
                             uy + approach * ny,
@@ -118,13 +119,12 @@ def make_loop(features, kind, report):
                             sx - along * nx,
                             sy - along * ny,
                             sz - along * nz,
-                            row.slid[i],
+                            cones,
                         )
                         fx += gx
                         fy += gy
                         fz += gz
                         row.shear[2, i] = sz if lasts else row.shear[2, i]
-                    row.slid[i] = slid if lasts else row.slid[i]
                     row.shear[0, i] = sx if lasts else row.shear[0, i]
                     row.shear[1, i] = sy if lasts else row.shear[1, i]
                 if viscous:

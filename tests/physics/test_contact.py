@@ -19,7 +19,10 @@ from physics import (
     World,
 )
 from physics.reference import closed_forms, scenes
-from physics.reference.scenes import GRAVITY, settled
+from physics.reference.measures import energy_gain, grazing
+from physics.reference.scenes import CUBE, GRAVITY, settled
+
+BALL = Sphere(0.025)
 
 PHASES = 100
 SPEED = 1.0
@@ -232,7 +235,7 @@ def test_a_ball_rolls_down_an_incline_at_five_sevenths_or_slides(degrees):
     assert world.linear_velocity[0, 0, 0] - before == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("friction", [0.05, 0.1])
+@pytest.mark.parametrize("friction", [0.05, 0.1, 0.2, 0.3])
 def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction):
     along, down, restitution, radius = 2.0, 1.0, 0.5, 0.1
     scene = scenes.sphere_on_ground(
@@ -246,6 +249,14 @@ def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction):
     assert world.linear_velocity[0, 0, 2] == pytest.approx(z, abs=1e-3)
     # the overlap shortens the lever by about 1 mm / 2
     assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=1e-2)
+
+
+@pytest.mark.parametrize(("fidelity", "most"), [("balanced", 1.5e-3), ("accurate", 1e-5)])
+@pytest.mark.parametrize("shapes", [(CUBE,), (BALL,), (CUBE, CUBE), (CUBE, BALL)])
+def test_a_collision_gains_no_energy_but_that_of_the_step(shapes, fidelity, most):
+    """What friction remembers is paid for; what is left falls with the step."""
+    for restitution, friction in ((0.95, 0.01), (0.95, 0.5), (0.95, 2.0), (0.5, 2.0)):
+        assert energy_gain(grazing(shapes, restitution, friction, fidelity)) <= most
 
 
 # --- shapes at rest -----------------------------------------------------------------------------
