@@ -25,7 +25,7 @@ demo: $(STAMP)
 	$(BIN)/rigid-envs demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 stress: $(STAMP)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress

@@ -4,8 +4,14 @@ import math
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-import mujoco
 import numpy as np
+
+try:
+    import mujoco
+except ModuleNotFoundError:
+    raise SystemExit(
+        "MuJoCo is measured beside: pip install -e '.[bench]', or make bench"
+    ) from None
 
 from physics import Body, Box, Capsule, Drive, Ground, Scene, Sphere, Static
 from physics.rotation import rotate, rotate_back
@@ -74,9 +80,11 @@ def model_of(
 class MujocoWorld:
     """One world of a scene without drives in MuJoCo, read and written as a physics.World is."""
 
-    def __init__(self, scene: Scene, timestep: float, integrator: str = "Euler") -> None:
-        """Puts the scene's bodies into their state; friction cones are elliptic, the exact ones."""
-        self._model = model_of(scene, timestep, integrator, cone="elliptic")
+    def __init__(
+        self, scene: Scene, timestep: float, integrator: str = "Euler", cone: str = "elliptic"
+    ) -> None:
+        """Puts the scene's bodies into their state; elliptic friction cones are the exact ones."""
+        self._model = model_of(scene, timestep, integrator, cone)
         self._data = mujoco.MjData(self._model)
         # a free joint's seven coordinates and six speeds, those of rotation in the body's frame
         self._place = self._data.qpos.reshape(1, -1, 7)

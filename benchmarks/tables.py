@@ -1,17 +1,21 @@
 """The saved figures as Markdown, for README and docs: python -m benchmarks.tables [name ...].
 
 Figures in the documents come from benchmarks/results.json, which `python -m benchmarks --save`
-writes, and from nowhere else.
+writes, and from nowhere else. --readme puts those of README.md in their place.
 """
 
 import argparse
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 from benchmarks.report import Table, describe, markdown
 
 RESULTS = Path(__file__).parent / "results.json"
+README = Path(__file__).parent.parent / "README.md"
+IN_README = ("speed", "presets", "tower 5", "accuracy", "restitution", "tumbling")
+_PLACE = re.compile("(<!-- figures: begin -->\n).*(\n<!-- figures: end -->)", re.DOTALL)
 
 
 def saved() -> tuple[dict[str, Any], dict[str, Table]]:
@@ -21,13 +25,37 @@ def saved() -> tuple[dict[str, Any], dict[str, Table]]:
     return results, {table.name: table for table in tables}
 
 
+def _without(table: Table, column: str) -> Table:
+    """A table less a column, and less the rows that have nothing else."""
+    if column not in table.columns:
+        return table
+    at = table.columns.index(column)
+    rows = [row[:at] + row[at + 1 :] for row in table.rows if row[0] != column]
+    return table._replace(columns=table.columns[:at] + table.columns[at + 1 :], rows=rows)
+
+
+def readme(text: str) -> str:
+    """README's text with the saved figures; bars are for those who work on this."""
+    circumstances, tables = saved()
+    parts = [
+        f"{table.title}:\n\n{markdown(table)}\n"
+        for table in (_without(tables[name], "bar") for name in IN_README)
+    ]
+    parts.append(describe(circumstances))
+    return _PLACE.sub(lambda m: m[1] + "\n".join(parts) + m[2], text)
+
+
 def run() -> None:
     """Prints the tables named, or all, and what they were measured on."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tables", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name")
+    parser.add_argument("--readme", action="store_true", help="write README.md instead")
     words = parser.parse_args()
     if not RESULTS.exists():
         parser.exit(2, "there are no saved figures yet: run python -m benchmarks --save\n")
+    if words.readme:
+        README.write_text(readme(README.read_text()))
+        return
     circumstances, tables = saved()
     if unknown := [name for name in words.names if name not in tables]:
         parser.error(f"unknown: {', '.join(unknown)}; there are {', '.join(tables)}")

@@ -1,12 +1,13 @@
 """What a Fidelity buys and costs: errors and simulated seconds a second, MuJoCo in the same run.
 
 Errors are relative, of scenes with closed forms (physics/reference/measures.py); towers of 4 cm
-cubes tell how far they drift and sink in 10 s. Speed is that of towers on one thread: 64 worlds at
-once, and one alone; MuJoCo steps one. MuJoCo has no restitution and so no oblique rebound. The
-figures of any list of settings come from `of_settings`.
+cubes tell how far they drift and sink in 10 s, or that they fall. Speed is that of towers on one
+thread: 64 worlds at once, and one alone; MuJoCo steps one. MuJoCo has no restitution and so no
+oblique rebound; its cones are elliptic unless a row says pyramidal.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
@@ -27,11 +28,12 @@ from physics.reference.measures import (
     slide,
     stand,
 )
-from physics.reference.scenes import tower
+from physics.reference.scenes import CUBE, tower
 
 TOWERS = (5, 10)
 TIME = 10.0  # s
 MANY = 64
+PEER = "MuJoCo 2 ms"
 SOLID = PRESETS["solid"]
 
 SETTINGS: dict[str, Fidelity] = {
@@ -44,15 +46,20 @@ SETTINGS: dict[str, Fidelity] = {
     "impulse, 1 ms": replace(SOLID, substep=1e-3),
     "impulse, 0.5 ms": replace(SOLID, substep=0.5e-3),
 }
-PEERS = {f"MuJoCo {1e3 * h:g} ms": h for h in (4e-3, 2e-3, 1e-3)}
+PEERS = {
+    "MuJoCo 4 ms": (4e-3, "elliptic"),
+    "MuJoCo 2 ms": (2e-3, "elliptic"),
+    "MuJoCo 2 ms, pyramidal": (2e-3, "pyramidal"),
+    "MuJoCo 1 ms": (1e-3, "elliptic"),
+}
 
 
 def _ours(fidelity: Fidelity, scene: Scene) -> World:
     return World(scene, fidelity, threads=1)
 
 
-def _peer(step: float, scene: Scene) -> MujocoWorld:
-    return MujocoWorld(scene, step)
+def _peer(step: float, cone: str, scene: Scene) -> MujocoWorld:
+    return MujocoWorld(scene, step, cone=cone)
 
 
 def _errors(make: Make, fidelity: Fidelity | None) -> list[Cell]:
@@ -79,40 +86,94 @@ def _rate(world: Any, worlds: int) -> float:
     return best
 
 
-def of_settings(settings: Mapping[str, Fidelity], peers: Mapping[str, float]) -> Iterator[Table]:
-    """Errors and speed of each setting, and of MuJoCo at steps in s."""
+def of_settings(
+    settings: Mapping[str, Fidelity],
+    peers: Mapping[str, tuple[float, str]] = PEERS,
+    towers: Sequence[int] = TOWERS,
+    time: float = TIME,
+) -> Iterator[Table]:
+    """Errors and speed of each setting, and of MuJoCo at steps in s with kinds of cones.
+
+    Towers of so many cubes stand for `time` s, or fall.
+    """
     sides: dict[str, tuple[Make, Fidelity | None, Callable[[Scene], Any]]] = {}
     for name, fidelity in settings.items():
         batch = partial(World, fidelity=fidelity, count=MANY, threads=1)
         sides[name] = (partial(_ours, fidelity), fidelity, batch)
-    for name, step in peers.items():
-        sides[name] = (partial(_peer, step), None, partial(_peer, step))
+    for name, (step, cone) in peers.items():
+        theirs = partial(_peer, step, cone)
+        sides[name] = (theirs, None, theirs)
     rows: list[list[Cell]] = [[name, *_errors(s[0], s[1])] for name, s in sides.items()]
     columns = ["setting", "slide from 0.5 m/s", "slope of 28°", "roll", "restitution"]
     columns += ["oblique, slides", "oblique, sticks"]
     yield Table("tradeoff", "Error against closed forms", columns, rows)
 
-    for cubes in TOWERS:
+    for cubes in towers:
         rows = []
         for name, (make, ours, many) in sides.items():
-            standing = stand(cubes, TIME, make)
+            standing = stand(cubes, time, make)
+            if standing.sink > CUBE.half_extents[2]:
+                rows.append([name, "fell", None, None, None])
+                continue
             alone = _rate(make(tower(cubes)), 1)
             together = alone if ours is None else _rate(many(tower(cubes)), MANY)
             rows.append([name, 1e3 * standing.drift, 1e3 * standing.sink, together, alone])
-        peer = rows[-2][3]
-        assert isinstance(peer, float)
-        for row in rows:
-            assert isinstance(row[3], float)
-            row.append(row[3] / peer)
-        columns = ["setting", f"drift in {TIME:g} s, mm", "sink of the topmost, mm"]
-        columns += [f"simulated s/s, {MANY} worlds", "one world", "ratio to MuJoCo 2 ms"]
+        columns = ["setting", f"drift in {time:g} s, mm", "sink of the topmost, mm"]
+        columns += [f"simulated s/s, {MANY} worlds", "one world"]
+        # the first that stands, at the step of most presets
+        stands = [row for row in rows if str(row[0]).startswith(PEER) and row[3] is not None]
+        if stands:
+            columns.append(f"ratio to {stands[0][0]}")
+            measured = stands[0][3]
+            for row in rows:
+                row.append(_ratio(row[3], measured))
         yield Table(f"tower {cubes}", f"{cubes} stacked cubes, one core", columns, rows)
+
+
+def _ratio(mine: Cell, theirs: Cell) -> Cell:
+    return mine / theirs if isinstance(mine, float) and isinstance(theirs, float) else None
 
 
 def measure() -> Iterator[Table]:
     """All tables of this module."""
-    yield from of_settings(SETTINGS, PEERS)
+    yield from of_settings(SETTINGS)
+
+
+def setting(words: str) -> tuple[str, Fidelity]:
+    """A name of SETTINGS, or fields of a Fidelity: substep=1e-3,contact_resolution=0.3."""
+    if words in SETTINGS:
+        return words, SETTINGS[words]
+    fields: dict[str, Any] = {}
+    for field in words.split(","):
+        name, _, value = field.partition("=")
+        if not value:
+            raise argparse.ArgumentTypeError(
+                f"{words!r} is neither one of {', '.join(map(repr, SETTINGS))} nor fields of a "
+                "Fidelity, as substep=1e-3,contact_resolution=0.3"
+            )
+        try:
+            fields[name.strip()] = float(value)
+        except ValueError:
+            fields[name.strip()] = value.strip()
+    try:
+        return words, Fidelity(**fields)
+    except (TypeError, ValueError) as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def run() -> None:
+    """Measures the settings named, or all."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.tradeoff", description=__doc__)
+    parser.add_argument(
+        "settings", nargs="*", type=setting,
+        help=f"{', '.join(SETTINGS)}; or fields of a Fidelity, as substep=1e-3,skin=0.2",
+    )  # fmt: skip
+    parser.add_argument("--towers", nargs="*", type=int, default=TOWERS, metavar="CUBES")
+    parser.add_argument("--time", type=float, default=TIME, help="s that towers are to stand")
+    words = parser.parse_args()
+    chosen = dict(words.settings) or SETTINGS
+    main(__doc__, lambda: of_settings(chosen, towers=words.towers, time=words.time))
 
 
 if __name__ == "__main__":
-    main(__doc__, measure)
+    run()

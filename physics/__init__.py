@@ -1,4 +1,4 @@
-"""A rigid-body engine: bodies made of particles, thousands of worlds at once, compiled by numba."""
+"""A rigid-body engine: bodies sampled by particles, thousands of worlds at once, by numba."""
 
 from physics.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged

@@ -135,16 +135,22 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
     if not features.impulse:
         origin = np.where(in_place, 0.0, origin)
 
+    def turned(vectors: Array) -> Array:
+        return np.einsum("nij,nj->ni", turns[surface], vectors)
+
     def in_world(name: str) -> Array:
         vectors = rows[name][slot, :, lane]
-        return np.where(in_place, vectors, np.einsum("nij,nj->ni", turns[surface], vectors))
+        return np.where(in_place, vectors, turned(vectors))
 
+    force = in_world("force")
+    if features.impulse:
+        force = force + turned(state.candidate["blow"][world // LANES, slot, :, lane])
     return Report(
         side=side,
         overlap=rows["overlap"][slot, lane],
         point=in_world("point") + origin,
         normal=in_world("normal"),
-        force=in_world("force"),
+        force=force,
         weight=rows["weight"][slot, lane],
     )
 
@@ -153,14 +159,28 @@ def contacts(model: Model, features: Features, state: State, world: int) -> Cont
     """The touching points of one world."""
     told = report(model, features, state, world)
     side = model.side[told.side]
+    pair = np.stack([side["owner"], side["surface"]], axis=-1)
+    first = {ends: first_touch(model, state, *ends)[world] for ends in set(map(tuple, pair))}
     return Contacts(
-        pair=np.stack([side["owner"], side["surface"]], axis=-1),
+        pair=pair,
         point=told.point,
         normal=told.normal,
         overlap=told.overlap,
         force=told.force,
-        first_touch=state.side["first_touch"][world, told.side],
+        first_touch=np.array([first[ends] for ends in map(tuple, pair)]),
     )
+
+
+def first_touch(model: Model, state: State, first: int, second: int) -> Array:
+    """When two solids first touched, [w] s, NaN before; all NaN if they never meet."""
+    touches = state.side["first_touch"][:, between(model, first, second)]
+    return np.fmin.reduce(touches, axis=1, initial=np.nan)
+
+
+def between(model: Model, first: int, second: int) -> Array:
+    """Which sides lie between two solids, [k] bools."""
+    ends = np.sort(np.stack([model.side["owner"], model.side["surface"]], axis=-1))
+    return np.asarray((ends == sorted((first, second))).all(axis=-1))
 
 
 def penetration(model: Model, features: Features, state: State) -> Array:

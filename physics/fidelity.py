@@ -70,7 +70,8 @@ class Fidelity:
             "skin": (0.01, 1.0),
         }
         for name, (low, high) in limits.items():
-            value = number(f"Fidelity.{name}", getattr(self, name), low=low, high=high)
+            with_law = f" with law={self.law!r}" if name == "contact_resolution" else ""
+            value = number(f"Fidelity.{name}{with_law}", getattr(self, name), low=low, high=high)
             object.__setattr__(self, name, value)
 
 

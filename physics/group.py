@@ -114,10 +114,10 @@ LANE = np.dtype(
         ("going", "i8", (LANES,)),  # 1: rounds aren't over
         ("speed", "f8", (LANES,)),  # m/s, fastest approach
         ("change", "f8", (LANES,)),  # m/s, largest of a round
-        ("share", "f8", (LANES,)),  # of restitution that the energy allows
-        ("before", "f8", (LANES,)),  # J, kinetic energy
-        ("pressed", "f8", (LANES,)),  # J, after compression
-        ("parted", "f8", (LANES,)),  # J, after restitution
+        ("bounce", "f8", (LANES,)),  # largest restitution
+        ("work", "f8", (LANES,)),  # J, of all impulses
+        ("allowed", "f8", (LANES,)),  # J, of restitution
+        ("share", "f8", (LANES,)),  # of restitution that this allows
     ],
     align=True,
 )

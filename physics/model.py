@@ -263,7 +263,8 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
             stiffness, pair_mass, shear_mass, _leverage(a) + _leverage(b), fidelity.substep
         )
         turning = 1.0 / _least_inertia(a) + 1.0 / _least_inertia(b)
-        if turning > 0.0:  # a tool that meets the ground turns no more than that
+        row["twist_stiffness"] = 1.0  # a tool that meets the ground turns no more than that
+        if turning > 0.0:
             row["rolling"], row["spinning"] = _resistance(a.material, b.material)
             row["twist_stiffness"], row["twist_damping"] = tangential_coefficients(
                 omega**2 / turning, 1.0 / turning, 1.0 / turning, 0.0, fidelity.substep

@@ -16,15 +16,18 @@ from physics.stages.kinematics import make_kinematics
 
 @cache
 def make_forces(features: Features):
-    """The forces at the present positions and half-step velocities, as the stages that add them."""
+    """The forces at the present positions, as the stages that add them.
+
+    Velocities are those of the last drift, of `drifted` s, and so half of it old.
+    """
     drives = make_drives(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
     @stage
-    def forces(model, state, work, g, h, elapsed):
+    def forces(model, state, work, g, h, drifted, elapsed):
         gravity(model, work)
-        drives(model, work, h)
-        contacts(model, state, work, g, h, elapsed)
+        drives(model, work, drifted)
+        contacts(model, state, work, g, h, drifted, elapsed)
 
     return forces
 
@@ -48,10 +51,11 @@ def make_substep(features: Features):
             drift(model, work, h)
         kinematics(model, work)
         candidates(model, state, work, g, opens)
-        forces(model, state, work, g, glance * h if look else h, elapsed)
         if look:
+            forces(model, state, work, g, glance * h, 0.0, elapsed)
             end_look(model, state, work, g)
         else:
+            forces(model, state, work, g, h, h, elapsed)
             kick(model, work, 0.5 * h)
 
     return substep

@@ -40,6 +40,7 @@ FOUND = np.dtype(
 STATUS = np.dtype(
     [
         ("time", "f8"),  # s
+        ("step", "f8"),  # s, length of the last substep of the impulse law; 0 before
         ("stale", "i4"),  # 1: set from outside, forces and candidates don't belong to it yet
         ("diverged", "i4"),  # 0, or 1 + index of the first non-finite mover
         ("overflow", "i8"),  # 1: a side had more candidates than room
@@ -57,7 +58,10 @@ def candidate_dtype(features: Features) -> np.dtype:
         # what a contact remembers
         ("load", "f8", (LANES,)),  # N, what pressed it in the last step
     ]
-    if not features.impulse:
+    if features.impulse:
+        # N, mean force of an instantaneous collision in the last step, in the surface's frame
+        fields.append(("blow", "f8", (3, LANES)))
+    else:
         fields.append(("impact_speed", "f8", (LANES,)))  # m/s, see overlap_force
     if features.friction and not features.viscous:
         fields.append(("shear", "f8", (3, LANES)))  # m

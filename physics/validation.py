@@ -16,7 +16,7 @@ def number(
     high: float = math.inf,
     exclusive: bool = False,
 ) -> float:
-    """`value` as a finite float within [low, high], or ]low, high[ if `exclusive`.
+    """`value` as a finite float within low and high, and neither of them if `exclusive`.
 
     Raises:
         TypeError: not a real number (bool counts as none).
@@ -25,12 +25,14 @@ def number(
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
         raise TypeError(f"{field} must be a number, got {value!r} ({type(value).__name__})")
     result = float(value)
-    if exclusive:
-        inside, brackets = low < result < high, f"]{low:g}, {high:g}["
-    else:
-        inside, brackets = low <= result <= high, f"[{low:g}, {high:g}]"
+    inside = low < result < high if exclusive else low <= result <= high
     if not math.isfinite(result) or not inside:
-        wanted = "finite" if math.isinf(low) and math.isinf(high) else f"finite and in {brackets}"
+        limits = [
+            f"{words[not exclusive]} {limit:g}"
+            for limit, words in ((low, ("above", "at least")), (high, ("below", "at most")))
+            if math.isfinite(limit)
+        ]
+        wanted = " and ".join(["finite", *limits])
         raise ValueError(f"{field} must be {wanted}, got {value!r}")
     return result
 
@@ -56,7 +58,8 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
     except (TypeError, ValueError):
         raise TypeError(f"{field} must be {size} numbers, got {value!r}") from None
     if array.shape != (size,):
-        raise ValueError(f"{field} must have shape ({size},), got shape {array.shape}: {value!r}")
+        names = "(x, y, z)" if size == 3 else "(x, y, z, w)"
+        raise ValueError(f"{field} must be {size} numbers {names}, got {value!r}")
     if not np.all(np.isfinite(array)):
         raise ValueError(f"{field} must be finite, got {value!r}")
     return tuple(float(x) for x in array)
@@ -65,7 +68,7 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
 def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
     """`value` as a quaternion x, y, z, w of length one; any length but zero is accepted."""
     quaternion = vector(field, value, 4)
-    length = math.sqrt(math.fsum(x * x for x in quaternion))
+    length = math.hypot(*quaternion)
     if length < 1e-12:
         raise ValueError(
             f"{field} must be a quaternion (x, y, z, w) of non-zero length, got {value!r}; "

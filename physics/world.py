@@ -1,21 +1,20 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
 import math
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics import diagnostics, stability
 from physics.clock import cut, make_advance
-from physics.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged
-from physics.features import ISOTROPIC, NO_ROTATION, Features
+from physics.features import NO_ROTATION
 from physics.fidelity import Fidelity, resolve
 from physics.group import Work
 from physics.jit import LANES
+from physics.limits import cause_of_divergence, check_step
 from physics.model import Model, build
-from physics.readout import WIDTH, Readout, make_readout
+from physics.readings import Readings
+from physics.readout import WIDTH, make_readout
 from physics.rotation import rotate, rotate_back
 from physics.scene import Body, Drive, Scene
 from physics.schedule import check_threads, share_out
@@ -27,13 +26,14 @@ Array = np.ndarray
 
 
 class Snapshot(NamedTuple):
-    """Everything that a world holds, hidden contact state included."""
+    """Everything that worlds hold, hidden contact state included, and what they are worlds of."""
 
-    features: Features
+    scene: Scene
+    fidelity: Fidelity
     state: State
 
 
-class World:
+class World(Readings):
     """`count` copies of a scene, advanced together.
 
     Args:
@@ -65,7 +65,8 @@ class World:
         self._bodies = len(scene.bodies)
         self._model: Model
         self._model, self._features = build(scene, self.fidelity)
-        self._check_step(allow_unstable)
+        if not allow_unstable:
+            check_step(scene, self.fidelity, self._model, self._features)
         self._find_kernels()
         self._idle: list[Work] = []
         self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
@@ -81,40 +82,6 @@ class World:
             f"World({self._bodies} bodies, {len(self.scene.drives)} drives, "
             f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count})"
         )
-
-    def _check_step(self, allow_unstable: bool) -> None:
-        h = self.fidelity.substep
-        for i, drive in enumerate(self.scene.drives):
-            longest = stability.of_servo(self._model.mover[self._bodies + i])
-            if h >= longest and not allow_unstable:
-                raise ValueError(
-                    f"Drive.frequency {drive.frequency:g} rad/s of drive {i} makes the substep of "
-                    f"{h:g} s unstable: the largest safe step is {longest:.3g} s; lower the "
-                    "frequency, shorten Fidelity.substep, or pass allow_unstable=True"
-                )
-        given = self._given_stiffness()
-        if allow_unstable or not given:
-            return
-        step, mover = self._safe_step(self._model)
-        if h > step:
-            for _ in range(8):  # friction's damping depends on the step as well, a little
-                model, _ = build(self.scene, replace(self.fidelity, substep=step))
-                step, mover = self._safe_step(model)
-            raise ValueError(
-                f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: "
-                f"{mover} binds, and the largest safe step is {step:.3g} s; lower the stiffness, "
-                "shorten Fidelity.substep, or pass allow_unstable=True"
-            )
-
-    def _given_stiffness(self) -> list[float]:
-        """Stiffness in N/m of the materials that name one."""
-        solids = (*self.scene.bodies, *self.scene.statics, *self.scene.drives)
-        return [x.material.stiffness for x in solids if x.material.stiffness is not None]
-
-    def _safe_step(self, model: Model) -> tuple[float, str]:
-        """A step in s that is safe in any state, and the name of the mover that binds it."""
-        step, i = stability.of_scene(self.scene, model, self._features, self.fidelity.spacing)
-        return step, f"body {i}" if i < self._bodies else f"drive {i - self._bodies}"
 
     def _initial_rows(self) -> Array:
         """The scene's state as rows [movers] of MOVING."""
@@ -136,11 +103,6 @@ class World:
         self._state.mover[worlds] = self._initial
         self._state.world["time"][worlds] = 0.0
         self._forget(worlds)
-
-    @property
-    def _inverse_mass(self) -> Array:
-        """Inverse masses [bodies]."""
-        return self._model.mover["inverse_mass"][: self._bodies]
 
     def _spin_momentum(self, orientation: Array, spin: Array) -> Array:
         """L = R J0 R^T omega, [..., bodies, 3]."""
@@ -205,14 +167,7 @@ class World:
 
     def _raise_diverged(self, h: float, worlds: list[int]) -> None:
         world = worlds[0]
-        step, mover = self._safe_step(self._model)
-        if h > step and self._given_stiffness():
-            cause = (
-                f"the substep of {h:g} s is longer than the largest safe one, {step:.3g} s, which "
-                f"{mover} sets"
-            )
-        else:
-            cause = "a state, speed or force too large for double precision"
+        cause = cause_of_divergence(self.scene, self.fidelity, self._model, self._features, h)
         raise SimulationDiverged(
             world,
             int(self._state.world["diverged"][world]) - 1,
@@ -233,140 +188,6 @@ class World:
                 self._run(self.fidelity.substep, 0, stale)
             finally:
                 self._state.world["stale"][stale] = 1
-
-    # --- reading ------------------------------------------------------------------------------
-
-    def _read(self, values: Array) -> Array:
-        view = values[:]
-        view.flags.writeable = False
-        return view
-
-    @property
-    def features(self) -> Features:
-        """What was compiled in for this scene."""
-        return self._features
-
-    @property
-    def time(self) -> Array:
-        """[count] s, read-only."""
-        return self._read(self._state.world["time"])
-
-    @property
-    def position(self) -> Array:
-        """[count, bodies, 3] m, centres of mass: a read-only view that follows the state."""
-        return self._read(self._state.mover["position"][:, : self._bodies])
-
-    @property
-    def orientation(self) -> Array:
-        """[count, bodies, 4] unit quaternions x y z w: a read-only view that follows the state."""
-        return self._read(self._state.mover["orientation"][:, : self._bodies])
-
-    @property
-    def linear_velocity(self) -> Array:
-        """[count, bodies, 3] m/s, world frame."""
-        return self._read(
-            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[:, None]
-        )
-
-    @property
-    def angular_velocity(self) -> Array:
-        """[count, bodies, 3] rad/s, world frame."""
-        momentum = self._state.mover["angular_momentum"][:, : self._bodies]
-        turn = self._state.mover["orientation"][:, : self._bodies]
-        inverse = self._model.mover["inverse_inertia"][: self._bodies]
-        if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
-            return self._read(inverse * momentum)
-        return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
-
-    @property
-    def drive_position(self) -> Array:
-        """[count, drives, 3] m: a read-only view that follows the state."""
-        return self._read(self._state.mover["position"][:, self._bodies :])
-
-    @property
-    def drive_velocity(self) -> Array:
-        """[count, drives, 3] m/s, world frame."""
-        inverse = self._model.mover["inverse_mass"][self._bodies :]
-        return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
-
-    def read(self) -> Readout:
-        """A copy of all poses and velocities, drives after the bodies, in one pass."""
-        if not self._rows_valid:
-            self._readout(self._model, self._state, self._rows)
-            self._rows_valid = True
-        return Readout(self._rows.copy())
-
-    def kinetic_energy(self) -> Array:
-        """[count] J of the bodies, translation and rotation."""
-        momentum = self._state.mover["momentum"][:, : self._bodies]
-        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._inverse_mass)
-        angular = self._state.mover["angular_momentum"][:, : self._bodies]
-        rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
-        return 0.5 * (translation + rotation)
-
-    def potential_energy(self) -> Array:
-        """[count] J of the bodies in the field of gravity, zero at the origin."""
-        weight = self._model.mover["weight"][: self._bodies]
-        return -np.einsum("wbi,bi->w", self._state.mover["position"][:, : self._bodies], weight)
-
-    def linear_momentum(self) -> Array:
-        """[count, 3] kg m/s of the bodies."""
-        return self._state.mover["momentum"][:, : self._bodies].sum(axis=1)
-
-    def angular_momentum(self) -> Array:
-        """[count, 3] kg m^2/s of the bodies about the origin."""
-        bodies = slice(0, self._bodies)
-        orbital = np.cross(
-            self._state.mover["position"][:, bodies], self._state.mover["momentum"][:, bodies]
-        )
-        return (orbital + self._state.mover["angular_momentum"][:, bodies]).sum(axis=1)
-
-    def penetration(self) -> Array:
-        """[count] m, deepest overlap now; 0 where nothing touches."""
-        self._settle()
-        return diagnostics.penetration(self._model, self._features, self._state)
-
-    def contacts(self, world: int = 0) -> Contacts:
-        """Who touches what in one world, where and how hard."""
-        self._settle()
-        return diagnostics.contacts(
-            self._model, self._features, self._state, self._world_index(world)
-        )
-
-    def first_touch(self, first: int, second: int) -> Array:
-        """[count] s, when two solids first touched since their state was set; NaN before.
-
-        Args:
-            first: index of a solid: bodies, then drives, then statics, each in scene order.
-            second: another.
-        """
-        ends = {integer("first", first, low=0), integer("second", second, low=0)}
-        sides = [
-            k
-            for k, side in enumerate(self._model.side)
-            if {int(side["owner"]), int(side["surface"])} == ends
-        ]
-        if not sides:
-            raise ValueError(f"solids {first!r} and {second!r} never meet in this scene")
-        return np.fmin.reduce(self._state.side["first_touch"][:, sides], axis=1)
-
-    def largest_stable_step(self, world: int = 0) -> float:
-        """Largest stable step in s with the contacts that a world has now; inf without any."""
-        self._settle()
-        return stability.of_contacts(
-            self._model, self._features, self._state, self._world_index(world)
-        )
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of state a world, beyond the shared model."""
-        return self._state.nbytes // self.count
-
-    def _world_index(self, world: int) -> int:
-        index = integer("world", world, low=0)
-        if index >= self.count:
-            raise ValueError(f"world must be below {self.count}, got {world!r}")
-        return index
 
     # --- writing ------------------------------------------------------------------------------
 
@@ -440,12 +261,14 @@ class World:
             if value is not None
         }
         if "orientation" in new:
-            length = np.sqrt(np.sum(new["orientation"] ** 2, axis=-1, keepdims=True))
-            if np.any(length < 1e-12):
+            # of the largest entry first: squares of large ones overflow
+            largest = np.abs(new["orientation"]).max(axis=-1, keepdims=True)
+            if np.any(largest < 1e-12):
                 raise ValueError(
                     "orientation holds a quaternion of length zero; no rotation is (0, 0, 0, 1)"
                 )
-            new["orientation"] = new["orientation"] / length
+            turn = new["orientation"] / largest
+            new["orientation"] = turn / np.sqrt(np.sum(turn**2, axis=-1, keepdims=True))
         spins = np.any(new.get("angular_velocity", 0.0))
         if self._features.rotation == NO_ROTATION and spins:
             raise ValueError(
@@ -493,18 +316,22 @@ class World:
 
     def snapshot(self) -> Snapshot:
         """Everything the worlds hold; `restore` continues from it to the last bit."""
-        return Snapshot(self._features, copy_state(self._state))
+        return Snapshot(self.scene, self.fidelity, copy_state(self._state))
 
     def restore(self, saved: Snapshot) -> None:
         """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
         instance("saved", saved, Snapshot)
-        shapes = [a.shape for a in self._state]
-        if saved.features != self._features or [a.shape for a in saved.state] != shapes:
-            worlds, movers = saved.state.mover.shape
-            raise ValueError(
-                f"saved belongs to another scene, fidelity or count: it holds {worlds} worlds of "
-                f"{movers} movers and {saved.features}; this is {self!r}"
+        differing = [
+            f"{name}: {theirs!r} instead of {mine!r}"
+            for name, theirs, mine in (
+                ("count", len(saved.state.world), self.count),
+                ("fidelity", saved.fidelity, self.fidelity),
+                ("scene", saved.scene, self.scene),
             )
+            if theirs != mine
+        ]
+        if differing:
+            raise ValueError(f"saved must be of the same worlds; it has another {differing[0]}")
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
         self._rows_valid = False

@@ -53,6 +53,8 @@ def make_search(features):
         if not impulse:
             row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
         for axis in range(3):
+            if impulse:
+                row.blow[axis, i] = 0.0
             if friction:
                 row.shear[axis, i] = old[cursor].shear[axis] if known else 0.0
             if friction and impulse:
@@ -91,6 +93,8 @@ def make_search(features):
             row.face[i] = 0.0
         for axis in range(3):
             row.sample[axis, i] = 0.0
+            if impulse:
+                row.blow[axis, i] = 0.0
             if friction:
                 row.shear[axis, i] = 0.0
             if friction and impulse:
@@ -101,10 +105,10 @@ def make_search(features):
                 row.partner[axis, i] = 0.0
 
     @kernel
-    def list_samples(model, state, work, g, k, i, seen, count, near):
+    def list_samples(model, state, work, g, k, i, seen, count, near, reach):
         """Fills the list from the samples; `count` entries of work.old are known from before.
 
-        `near`: where work.near begins for this side.
+        `near`: where work.near begins for this side. `reach`: m, of the gaps to list.
         """
         side, old = model.side[k], work.old
         first, room = side.first_slot, side.slot_count
@@ -112,7 +116,7 @@ def make_search(features):
         ids = state.sample_id[g, first : first + room]
         R, c = seen.rotation, seen.position
         height = side.core[0] if side.kind == PLANE else 0.0
-        radius, skin = side.radius, side.skin
+        radius = side.radius
         n = 0
         cursor = 0
         nearest = 1e300
@@ -127,9 +131,9 @@ def make_search(features):
                     p = model.sample[side.first_partner + j]
                     ux, uy, uz = x - p[0], y - p[1], z - p[2]
                     gap = math.sqrt(ux * ux + uy * uy + uz * uz) - radius
-                    if gap < skin and n == room:
+                    if gap < reach and n == room:
                         state.world[g * LANES + i].overflow = 1
-                    elif gap < skin:
+                    elif gap < reach:
                         key = s * side.partner_count + j
                         shared = min(weight, p[3])
                         cursor = keep(candidate[n], i, old, cursor, count, key, sx, sy, sz, shared)
@@ -142,7 +146,7 @@ def make_search(features):
             else:
                 gap, nx, ny, nz = distance(side, x, y, z)
                 gap -= radius
-                if gap < skin:
+                if gap < reach:
                     if impulse:
                         note(
                             work.near[near + n],
@@ -161,11 +165,14 @@ def make_search(features):
                     n += 1
                 elif gap < nearest:
                     nearest = gap
-        return n, skin if n > 0 else nearest
+        return n, reach if n > 0 else nearest
 
     @kernel
-    def search(model, state, work, g, k, i, seen, near):
-        """`seen`: the owner in the frame of the surface. `near`: see `list_samples`."""
+    def search(model, state, work, g, k, i, seen, near, path):
+        """`seen`: the owner in the frame of the surface. `near`: see `list_samples`.
+
+        `path`: m that the two have moved in the last drift.
+        """
         side, meeting = model.side[k], work.side[k]
         first, before = side.first_slot, meeting.count[i]
         c = seen.position
@@ -175,13 +182,17 @@ def make_search(features):
         else:
             far = math.sqrt(c[0, i] * c[0, i] + c[1, i] * c[1, i] + c[2, i] * c[2, i])
             gap = far - side.owner_reach - side.surface_reach
+        reach = side.skin
+        if impulse and side.partner_count == 0:
+            # what is met by the middle of the next drift collides before it overlaps
+            reach = max(reach, 0.5 * path)
         count = 0
         travel = gap
-        if not gap > side.skin:
+        if not gap > reach:
             for n in range(before):
                 key = state.sample_id[g, first + n, i]
                 remember(state.candidate[g, first + n], i, key, work.old[n])
-            count, travel = list_samples(model, state, work, g, k, i, seen, before, near)
+            count, travel = list_samples(model, state, work, g, k, i, seen, before, near, reach)
         for n in range(count, before):
             clear(state.candidate[g, first + n], i)
         meeting.count[i] = count
@@ -219,9 +230,9 @@ def make_side_search(features):
         for i in range(LANES):
             path = owner.path[i] + surface.path[i]
             if work.lane[0].active[i] and meeting.travel[i] < max(least, path):
-                search(model, state, work, g, k, i, seen, 0)
+                search(model, state, work, g, k, i, seen, 0, path)
                 if mirror >= 0:
-                    search(model, state, work, g, mirror, i, back, meeting.count[i])
+                    search(model, state, work, g, mirror, i, back, meeting.count[i], path)
                 if impulse:
                     choose(model, state, work, g, k, i)
         count_slots(work, k)

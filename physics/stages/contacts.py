@@ -261,7 +261,7 @@ def make_contacts(features):
     side = make_side(features, False)
 
     @stage
-    def contacts(model, state, work, g, h, elapsed):
+    def contacts(model, state, work, g, h, drifted, elapsed):
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
                 side(model, state, work, (), g, k, h)

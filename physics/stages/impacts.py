@@ -1,5 +1,6 @@
 """Instantaneous collisions with restitution, of any number of contacts at once.
 
+Bodies collide with the speeds of now, without what the last step gave only to push overlaps apart.
 A contact collides if it closes faster than the floor, (v_a - v_b) n < -v_0, and will have touched
 by the middle of the coming drift. All that touches takes part: a blow on a stack is felt below it.
 Poisson's hypothesis, which unlike Newton's needs no more care for several contacts than for one:
@@ -8,7 +9,8 @@ Poisson's hypothesis, which unlike Newton's needs no more care for several conta
    Gauss-Seidel; each correction takes energy or leaves it;
 2. restitution: every colliding contact gives e p again, all at once. Without friction the speeds
    become -e times what they were. The energy that this returns is e^2 of what compression took;
-   if, by friction's doing, it would be more, it is scaled down to that: no collision gains energy;
+   if, by friction's doing, it would be more, it is scaled down to that, with the largest e of what
+   collides in the world at that moment: no collision gains energy;
 3. friction anew, with what now presses, and no approach at contacts that only took part.
 
 The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the factor is the impulse.
@@ -18,7 +20,6 @@ import math
 from functools import cache
 
 from physics.jit import LANES, kernel, stage
-from physics.stages.kinematics import turned_back
 from physics.stages.points import ends, give, slip
 
 # Rounds end when none has changed a speed by more than this share of the fastest approach, or after
@@ -27,7 +28,7 @@ SMALL, ROUNDS = 1e-6, 64
 
 
 @kernel
-def find(points, owner, surface, constants, h, struck, speed):
+def find(points, owner, surface, constants, h, lane):
     """Notes the restitution of each point that collides, -1 of others, and which lanes have one."""
     e, floor = constants.restitution, constants.rest_speed
     for n in range(points.shape[0]):
@@ -42,8 +43,26 @@ def find(points, owner, surface, constants, h, struck, speed):
             point.hit[i] = 0.0
             for axis in range(3):
                 point.skid[axis, i] = 0.0
-            struck[i] = 1 if collides else struck[i]
-            speed[i] = max(speed[i], -un) if collides else speed[i]
+            lane.struck[i] = 1 if collides else lane.struck[i]
+            lane.speed[i] = max(lane.speed[i], -un) if collides else lane.speed[i]
+            lane.bounce[i] = max(lane.bounce[i], e) if collides else lane.bounce[i]
+
+
+@kernel
+def retract(points, owner, surface, A, B, ma, mb, struck):
+    """Takes back what pushed overlaps apart in the last step: that speed is none of the bodies'."""
+    for n in range(points.shape[0]):
+        point = points[n]
+        for i in range(LANES):
+            nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+            ux, uy, uz = slip(owner, surface, point, i)
+            un = ux * nx + uy * ny + uz * nz
+            push = point.push[i]
+            new = min(max(push - point.mass[i] * un, 0.0), push)
+            new = new if (struck[i] != 0) & (point.weight[i] > 0.0) else push
+            step = new - push
+            point.push[i] = new
+            give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
 
 
 @cache
@@ -52,8 +71,12 @@ def make_press(features):
     friction = features.friction
 
     @kernel
-    def press(points, owner, surface, A, B, ma, mb, mu, going, change, after):
-        """`after` restitution, contacts that bounce keep what they gave along the normal."""
+    def press(points, owner, surface, A, B, ma, mb, mu, lane, after):
+        """`after` restitution, contacts that bounce keep what they gave along the normal.
+
+        Adds the work of all impulses to `lane.work`.
+        """
+        going, change, work = lane.going, lane.change, lane.work
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
@@ -69,6 +92,7 @@ def make_press(features):
                 step = new - hit
                 point.hit[i] = new
                 change[i] = max(change[i], abs(step) / point.mass[i])
+                work[i] += step * (un + 0.5 * step / point.mass[i])
                 give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
                 if friction:
                     ux, uy, uz = slip(owner, surface, point, i)
@@ -91,40 +115,27 @@ def make_press(features):
                     size = max(abs(px), max(abs(py), abs(pz)))
                     change[i] = max(change[i], size / m)
                     give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
+                    vx, vy, vz = slip(owner, surface, point, i)
+                    work[i] += 0.5 * (px * (ux + vx) + py * (uy + vy) + pz * (uz + vz))
 
     return press
 
 
 @kernel
-def give_back(points, owner, surface, A, B, ma, mb, share, again):
+def rebound(points, owner, surface, A, B, ma, mb, lane, again):
     """Restitution: e of what compression gave; `again`, all but a share of it is taken back."""
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
             e = max(point.bounce[i], 0.0)
             compression = point.hit[i] / (1.0 + e) if again else point.hit[i]
-            step = (share[i] - 1.0) * e * compression if again else e * compression
+            step = (lane.share[i] - 1.0) * e * compression if again else e * compression
             point.hit[i] += step
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+            ux, uy, uz = slip(owner, surface, point, i)
+            un = ux * nx + uy * ny + uz * nz
+            lane.work[i] += step * (un + 0.5 * step / point.mass[i])
             give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
-
-
-@kernel
-def kinetic_energy(model, work, energy):
-    """J, by the velocities of the moment."""
-    for i in range(LANES):
-        energy[i] = 0.0
-    for m in range(model.mover.shape[0]):
-        solid, constants = work.solid[m], model.mover[m]
-        v, omega = solid.velocity, solid.spin
-        mass, j = 1.0 / constants.inverse_mass, constants.inertia
-        jx, jy, jz = j[0], j[1], j[2]
-        for i in range(LANES):
-            twice = mass * (v[0, i] * v[0, i] + v[1, i] * v[1, i] + v[2, i] * v[2, i])
-            if constants.turns:
-                x, y, z = turned_back(solid.rotation, i, omega[0, i], omega[1, i], omega[2, i])
-                twice += jx * x * x + jy * y * y + jz * z * z
-            energy[i] += 0.5 * twice
 
 
 @stage
@@ -160,7 +171,7 @@ def make_impacts(features):
                     points, A, B, ma, mb = ends(model, work, k)
                     a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                     mu = model.side[k].friction
-                    press(points, a, b, A, B, ma, mb, mu, lane.going, lane.change, after)
+                    press(points, a, b, A, B, ma, mb, mu, lane, after)
             going = 0
             for i in range(LANES):
                 lane.going[i] = lane.going[i] if lane.change[i] > SMALL * lane.speed[i] else 0
@@ -174,42 +185,53 @@ def make_impacts(features):
             if work.side[k].slots > 0:
                 points, A, B, ma, mb = ends(model, work, k)
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                give_back(points, a, b, A, B, ma, mb, work.lane[0].share, again)
+                rebound(points, a, b, A, B, ma, mb, work.lane[0], again)
 
     @kernel
     def collide(model, work):
         lane = work.lane[0]
-        kinetic_energy(model, work, lane.before)
-        press_all(model, work, False)
-        kinetic_energy(model, work, lane.pressed)
-        restitute(model, work, False)
-        kinetic_energy(model, work, lane.parted)
-        e = 0.0
-        for k in range(model.side.shape[0]):
-            e = max(e, model.side[k].restitution)
         for i in range(LANES):
-            lost, won = lane.before[i] - lane.pressed[i], lane.parted[i] - lane.pressed[i]
-            allowed = e * e * max(lost, 0.0)
+            lane.work[i] = 0.0
+        press_all(model, work, False)
+        for i in range(LANES):
+            e = lane.bounce[i]
+            lane.allowed[i] = e * e * max(-lane.work[i], 0.0)
+            lane.work[i] = 0.0
+        restitute(model, work, False)
+        for i in range(LANES):
+            allowed, won = lane.allowed[i], lane.work[i]
             lane.share[i] = math.sqrt(allowed / won) if won > allowed else 1.0
         restitute(model, work, True)
         press_all(model, work, True)
         book_hits(model, work)
 
-    @stage
-    def impacts(model, work, h):
-        lane = work.lane[0]
+    @kernel
+    def find_all(model, work, h):
+        """Number of lanes with a collision."""
+        lane, lanes = work.lane[0], 0
         for i in range(LANES):
             lane.struck[i] = 0
             lane.speed[i] = 0.0
+            lane.bounce[i] = 0.0
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
                 points = ends(model, work, k)[0]
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                find(points, a, b, model.side[k], h, lane.struck, lane.speed)
-        any_struck = 0
+                find(points, a, b, model.side[k], h, lane)
         for i in range(LANES):
-            any_struck += lane.struck[i]
-        if any_struck > 0:
+            lanes += lane.struck[i]
+        return lanes
+
+    @stage
+    def impacts(model, work, h):
+        if find_all(model, work, h) == 0:
+            return
+        for k in range(model.side.shape[0]):
+            if work.side[k].slots > 0:
+                points, A, B, ma, mb = ends(model, work, k)
+                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
+                retract(points, a, b, A, B, ma, mb, work.lane[0].struck)
+        if find_all(model, work, h) > 0:
             collide(model, work)
 
     return impacts

@@ -35,6 +35,9 @@ from physics.stages.points import cross, ends, give, make_points, place_tensors,
 PUSH_SPEED = 1.0
 # 1/s at which an anchor takes its stretch back
 ANCHOR = 5.0
+# 1/s at which an anchor forgets: where two sides meet in the same place but stuck apart, one can
+# only be at rest by pulling against the other, ever harder
+FORGET = 0.1
 
 
 @stage
@@ -118,10 +121,10 @@ def make_sweep(features):
                     point.pull[1, i] = qy
                     point.pull[2, i] = qz
                     if soft:
-                        holds = size <= limit
-                        point.anchor[0, i] = point.anchor[0, i] if holds else 0.0
-                        point.anchor[1, i] = point.anchor[1, i] if holds else 0.0
-                        point.anchor[2, i] = point.anchor[2, i] if holds else 0.0
+                        held = 1.0 - h * FORGET if size <= limit else 0.0
+                        point.anchor[0, i] *= held
+                        point.anchor[1, i] *= held
+                        point.anchor[2, i] *= held
                     give(owner, surface, A, B, ma, mb, point, i, qx - px, qy - py, qz - pz)
                 if resistance:
                     resist(owner, surface, A, B, point, i, new, rolling, spinning)
@@ -181,6 +184,17 @@ def make_book(features):
                 fz = point.spent[2, i] + push * point.normal[2, i]
                 pressed[i] += push + point.hit[i]
                 row.load[i] = per_h * push if keeps[i] != 0 else row.load[i]
+                hit = per_h * point.hit[i]
+                bx, by, bz = turned_back(
+                    Q,
+                    i,
+                    hit * point.normal[0, i] + per_h * point.skid[0, i],
+                    hit * point.normal[1, i] + per_h * point.skid[1, i],
+                    hit * point.normal[2, i] + per_h * point.skid[2, i],
+                )
+                row.blow[0, i] = bx if keeps[i] != 0 else row.blow[0, i]
+                row.blow[1, i] = by if keeps[i] != 0 else row.blow[1, i]
+                row.blow[2, i] = bz if keeps[i] != 0 else row.blow[2, i]
                 if friction:
                     px, py, pz = point.pull[0, i], point.pull[1, i], point.pull[2, i]
                     fx += px
@@ -281,7 +295,7 @@ def make_impulses(features):
         note_touch(work, k, owner.pressed, elapsed)
 
     @kernel
-    def impulses(model, state, work, g, h, elapsed):
+    def impulses(model, state, work, g, h, drifted, elapsed):
         sides, touching = model.side.shape[0], 0
         for k in range(sides):
             touching += work.side[k].slots
@@ -291,7 +305,10 @@ def make_impulses(features):
         for k in range(sides):
             if work.side[k].slots > 0:
                 points(model, state, work, g, k, work.lane[0].keeps, h)
+        # bodies collide with the speeds of now
+        outside(model, work, 0.5 * drifted)
         impacts(model, work, h)
+        outside(model, work, -0.5 * drifted)
         correct(model, work, h, False)
         outside(model, work, h)
         for k in range(sides):

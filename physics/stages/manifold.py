@@ -6,6 +6,7 @@ largest patch, with the weight of all. They are chosen when the lists are made: 
 sample can get as deep as the skin is wide, if a body turns about those chosen.
 """
 
+import math
 from functools import cache
 
 from physics.jit import kernel
@@ -56,11 +57,14 @@ def _area(a, b, c, normal):
 
 
 @kernel
-def _farthest(near, n, group, x, y, z):
-    """Index of the group's point farthest from a place, and the square of the distance."""
+def _farthest(near, n, group, x, y, z, highest):
+    """Index of the group's point farthest from a place, and the square of the distance.
+
+    Of those only whose gap is at most `highest`.
+    """
     best, far = 0, -1.0
     for j in range(n):
-        if near[j].group == group:
+        if near[j].group == group and near[j].gap <= highest:
             dx, dy, dz = near[j].position[0] - x, near[j].position[1] - y, near[j].position[2] - z
             square = dx * dx + dy * dy + dz * dz
             # twins that lie together must not take turns
@@ -72,11 +76,10 @@ def _farthest(near, n, group, x, y, z):
 @kernel
 def _span(near, n, group, deepest, skin, x, y, z):
     """Four of a group whose middle is x y z, or fewer if they lie in line; -1 for none."""
-    first, far = _farthest(near, n, group, x, y, z)
-    if near[deepest].gap < near[first].gap - _DEEPER * skin:
-        first = deepest
+    low = near[deepest].gap + _DEEPER * skin
+    first, far = _farthest(near, n, group, x, y, z, low)
     p, normal = near[first].position, near[deepest].normal
-    second, far = _farthest(near, n, group, p[0], p[1], p[2])
+    second, far = _farthest(near, n, group, p[0], p[1], p[2], math.inf)
     least = _FLAT * far
     third, fourth, most, fewest = -1, -1, least, -least
     for j in range(n):
@@ -86,6 +89,8 @@ def _span(near, n, group, deepest, skin, x, y, z):
                 third, most = j, area
             if area < fewest * (1.0 + 1e-6):
                 fourth, fewest = j, area
+    if third < 0 and fourth < 0:  # an edge lies on both its ends, whatever hangs farther out
+        second, far = _farthest(near, n, group, p[0], p[1], p[2], low)
     return first, second, third, fourth
 
 

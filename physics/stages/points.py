@@ -173,7 +173,6 @@ def make_place(features, kind):
         """`h` is the time in s in which last step's impulses were given and this one's will be."""
         R, c = seen.rotation, seen.position
         Q, a, b = surface.rotation, owner.position, surface.position
-        v, u, omega, spin = owner.velocity, surface.velocity, owner.spin, surface.spin
         radius, owner_radius = constants.radius, constants.owner_radius
         ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
         sharp, inverse_mass = constants.sharp != 0, 1.0 / constants.pair_mass
@@ -218,12 +217,11 @@ def make_place(features, kind):
                     point.pull[1, i] = py
                     point.pull[2, i] = pz
                     gx, gy, gz = gx + px, gy + py, gz + pz
-                    ox, oy, oz = cross(omega[0, i], omega[1, i], omega[2, i], ax, ay, az)
-                    wx, wy, wz = cross(spin[0, i], spin[1, i], spin[2, i], bx, by, bz)
+                    ux, uy, uz = slip(owner, surface, point, i)
                     sx, sy, sz = turned(Q, i, row.shear[0, i], row.shear[1, i], row.shear[2, i])
-                    sx += h * (v[0, i] + ox - u[0, i] - wx)
-                    sy += h * (v[1, i] + oy - u[1, i] - wy)
-                    sz += h * (v[2, i] + oz - u[2, i] - wz)
+                    sx += h * ux
+                    sy += h * uy
+                    sz += h * uz
                     along = sx * nx + sy * ny + sz * nz
                     held = push > 0.0
                     point.anchor[0, i] = sx - along * nx if held else 0.0

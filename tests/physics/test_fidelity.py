@@ -48,10 +48,12 @@ def test_an_unknown_choice_is_named_with_the_valid_ones(field, value):
 @pytest.mark.parametrize("field", ["substep", *LIMITS])
 def test_a_number_is_finite_positive_and_within_its_limits(field):
     for value in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(ValueError, match=rf"Fidelity\.{field} must be finite and in"):
+        wanted = rf"Fidelity\.{field}.* must be finite and (at least|above)"
+        with pytest.raises(ValueError, match=wanted):
             Fidelity(**{field: value})
     for value in ("1", None, True):
-        with pytest.raises(TypeError, match=rf"Fidelity\.{field} must be a number, got {value!r}"):
+        wanted = rf"Fidelity\.{field}.* must be a number, got {value!r}"
+        with pytest.raises(TypeError, match=wanted):
             Fidelity(**{field: value})
     if field in LIMITS:
         Fidelity(**{field: LIMITS[field]})
@@ -60,10 +62,10 @@ def test_a_number_is_finite_positive_and_within_its_limits(field):
 
 
 def test_each_law_has_its_largest_contact_resolution():
-    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*0\.7\], got 1\.8"):
+    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*at most 0\.7, got 1\.8"):
         Fidelity(contact_resolution=1.8)
     assert Fidelity(law="impulse", contact_resolution=2.0).contact_resolution == 2.0
-    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*2\], got 2\.1"):
+    with pytest.raises(ValueError, match=r"Fidelity\.contact_resolution .*at most 2, got 2\.1"):
         Fidelity(law="impulse", contact_resolution=2.1)
 
 

@@ -17,7 +17,7 @@ def test_every_kind_of_number_becomes_a_float(value):
 
 def test_numbers_keep_to_their_range():
     assert validation.number("x", 0.0, low=0.0, high=1.0) == 0.0
-    with pytest.raises(ValueError, match=r"x must be finite and in \]0, 1\[, got 0\.0"):
+    with pytest.raises(ValueError, match=r"x must be finite and above 0 and below 1, got 0\.0"):
         validation.number("x", 0.0, low=0.0, high=1.0, exclusive=True)
     with pytest.raises(ValueError, match=r"x must be finite, got nan"):
         validation.number("x", math.nan)

@@ -71,7 +71,7 @@ def test_advance_leaves_no_remainder(span):
 
 @pytest.mark.parametrize("span", [0.0, -1.0, math.nan, math.inf])
 def test_time_moves_forward_by_a_finite_span(span):
-    with pytest.raises(ValueError, match=r"time must be finite and in \]0, inf\[, got"):
+    with pytest.raises(ValueError, match=r"time must be finite and above 0, got"):
         World(scenes.sphere_on_ground()).advance(span)
 
 
@@ -226,8 +226,10 @@ def test_first_touch_is_when_a_falling_ball_lands():
 
 def test_solids_that_never_meet_and_worlds_that_are_not_there_are_named():
     world = World(scenes.push_like(), count=2)
-    with pytest.raises(ValueError, match="solids 0 and 7 never meet"):
+    with pytest.raises(ValueError, match=r"second must be the index of a solid, 0 to 2 .*, got 7"):
         world.first_touch(0, 7)
+    with pytest.raises(ValueError, match="solids that can meet, got 1 and 1"):
+        world.first_touch(1, 1)
     with pytest.raises(ValueError, match="world must be below 2, got 2"):
         world.contacts(2)
     with pytest.raises(ValueError, match="world must be at least 0, got -1"):
@@ -389,9 +391,9 @@ def test_a_pickled_world_continues_to_the_last_bit():
 
 def test_a_snapshot_of_another_world_is_refused():
     world = thrown(2)
-    with pytest.raises(ValueError, match="saved belongs to another scene, fidelity or count"):
+    with pytest.raises(ValueError, match="saved must be of the same worlds; it has another count"):
         world.restore(thrown(3).snapshot())
-    with pytest.raises(ValueError, match="saved belongs to another scene, fidelity or count"):
+    with pytest.raises(ValueError, match="saved must be of the same worlds; it has another scene"):
         world.restore(World(scenes.two_cubes(), count=2).snapshot())
     with pytest.raises(TypeError, match="saved must be Snapshot, got 3"):
         world.restore(3)

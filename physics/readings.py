@@ -1,0 +1,180 @@
+"""What can be read of worlds: poses, velocities, energies, contacts."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from physics import diagnostics, stability
+from physics.diagnostics import Contacts
+from physics.features import ISOTROPIC, Features
+from physics.fidelity import Fidelity
+from physics.model import Model
+from physics.readout import Readout
+from physics.rotation import rotate, rotate_back
+from physics.scene import Scene
+from physics.state import State
+from physics.validation import integer
+
+Array = np.ndarray
+
+
+class Readings:
+    """The reading half of a World, which makes all that is named here."""
+
+    scene: Scene
+    fidelity: Fidelity
+    count: int
+    _bodies: int
+    _model: Model
+    _features: Features
+    _state: State
+    _rows: Array
+    _rows_valid: bool
+    _readout: Callable[[Model, State, Array], object]
+
+    def _settle(self) -> None:
+        """Brings candidates and forces up to a state that was set from outside."""
+        raise NotImplementedError
+
+    @property
+    def _inverse_mass(self) -> Array:
+        """Inverse masses [bodies]."""
+        return self._model.mover["inverse_mass"][: self._bodies]
+
+    def _read(self, values: Array) -> Array:
+        view = values[:]
+        view.flags.writeable = False
+        return view
+
+    @property
+    def features(self) -> Features:
+        """What was compiled in for this scene."""
+        return self._features
+
+    @property
+    def time(self) -> Array:
+        """[count] s, read-only."""
+        return self._read(self._state.world["time"])
+
+    @property
+    def position(self) -> Array:
+        """[count, bodies, 3] m, centres of mass: a read-only view that follows the state."""
+        return self._read(self._state.mover["position"][:, : self._bodies])
+
+    @property
+    def orientation(self) -> Array:
+        """[count, bodies, 4] unit quaternions x y z w: a read-only view that follows the state."""
+        return self._read(self._state.mover["orientation"][:, : self._bodies])
+
+    @property
+    def linear_velocity(self) -> Array:
+        """[count, bodies, 3] m/s, world frame."""
+        return self._read(
+            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[:, None]
+        )
+
+    @property
+    def angular_velocity(self) -> Array:
+        """[count, bodies, 3] rad/s, world frame."""
+        momentum = self._state.mover["angular_momentum"][:, : self._bodies]
+        turn = self._state.mover["orientation"][:, : self._bodies]
+        inverse = self._model.mover["inverse_inertia"][: self._bodies]
+        if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
+            return self._read(inverse * momentum)
+        return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
+
+    @property
+    def drive_position(self) -> Array:
+        """[count, drives, 3] m: a read-only view that follows the state."""
+        return self._read(self._state.mover["position"][:, self._bodies :])
+
+    @property
+    def drive_velocity(self) -> Array:
+        """[count, drives, 3] m/s, world frame."""
+        inverse = self._model.mover["inverse_mass"][self._bodies :]
+        return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
+
+    def read(self) -> Readout:
+        """A copy of all poses and velocities, drives after the bodies, in one pass."""
+        if not self._rows_valid:
+            self._readout(self._model, self._state, self._rows)
+            self._rows_valid = True
+        return Readout(self._rows.copy())
+
+    def kinetic_energy(self) -> Array:
+        """[count] J of the bodies, translation and rotation."""
+        momentum = self._state.mover["momentum"][:, : self._bodies]
+        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._inverse_mass)
+        angular = self._state.mover["angular_momentum"][:, : self._bodies]
+        rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
+        return 0.5 * (translation + rotation)
+
+    def potential_energy(self) -> Array:
+        """[count] J of the bodies in the field of gravity, zero at the origin."""
+        weight = self._model.mover["weight"][: self._bodies]
+        return -np.einsum("wbi,bi->w", self._state.mover["position"][:, : self._bodies], weight)
+
+    def linear_momentum(self) -> Array:
+        """[count, 3] kg m/s of the bodies."""
+        return self._state.mover["momentum"][:, : self._bodies].sum(axis=1)
+
+    def angular_momentum(self) -> Array:
+        """[count, 3] kg m^2/s of the bodies about the origin."""
+        bodies = slice(0, self._bodies)
+        orbital = np.cross(
+            self._state.mover["position"][:, bodies], self._state.mover["momentum"][:, bodies]
+        )
+        return (orbital + self._state.mover["angular_momentum"][:, bodies]).sum(axis=1)
+
+    def penetration(self) -> Array:
+        """[count] m, deepest overlap now; 0 where nothing touches."""
+        self._settle()
+        return diagnostics.penetration(self._model, self._features, self._state)
+
+    def contacts(self, world: int = 0) -> Contacts:
+        """Who touches what in one world, where and how hard."""
+        self._settle()
+        return diagnostics.contacts(
+            self._model, self._features, self._state, self._world_index(world)
+        )
+
+    def first_touch(self, first: int, second: int) -> Array:
+        """[count] s, when two solids first touched since their state was set; NaN before.
+
+        Args:
+            first: index of a solid: bodies, then drives, then statics, each in scene order.
+            second: another.
+        """
+        ends = integer("first", first, low=0), integer("second", second, low=0)
+        last = self._bodies + len(self.scene.drives) + len(self.scene.statics) - 1
+        for name, value in zip(("first", "second"), ends, strict=True):
+            if value > last:
+                raise ValueError(
+                    f"{name} must be the index of a solid, 0 to {last} (bodies, then drives, then "
+                    f"statics), got {value}"
+                )
+        if not diagnostics.between(self._model, *ends).any():
+            raise ValueError(
+                f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
+                "one solid, or two of which neither is a body that moves freely"
+            )
+        self._settle()
+        return diagnostics.first_touch(self._model, self._state, *ends)
+
+    def largest_stable_step(self, world: int = 0) -> float:
+        """Largest stable step in s with the contacts that a world has now; inf without any."""
+        self._settle()
+        return stability.of_contacts(
+            self._model, self._features, self._state, self._world_index(world)
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of state a world, beyond the shared model."""
+        return self._state.nbytes // self.count
+
+    def _world_index(self, world: int) -> int:
+        index = integer("world", world, low=0)
+        if index >= self.count:
+            raise ValueError(f"world must be below {self.count}, got {world!r}")
+        return index
