@@ -43,6 +43,9 @@ MEETING = np.dtype(
         ("count", "i8", (LANES,)),  # candidates
         ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
         ("first_touch", "f8", (LANES,)),  # s, NaN before
+        ("bore", "f8", (LANES,)),  # weight that touched in the last step
+        ("bearing", "f8", (LANES,)),  # in this step, so far
+        ("share", "f8", (LANES,)),  # of the pair's stiffness that touched in the last step
         ("slots", "i8"),  # the largest count
     ],
     align=True,
@@ -54,6 +57,7 @@ REMEMBERED = np.dtype(
         ("sample_id", "i8"),
         ("impact_speed", "f8"),
         ("load", "f8"),
+        ("approach", "f8"),
         ("shear", "f8", (3,)),
         ("pull", "f8", (3,)),
         ("twist", "f8", (3,)),
@@ -227,10 +231,12 @@ def load(model, state, work, chosen, g):
                 side.count[i] = found.count
                 side.travel[i] = found.travel
                 side.first_touch[i] = found.first_touch
+                side.bore[i] = found.bore
             else:
                 side.count[i] = 0
                 side.travel[i] = 1e300
                 side.first_touch[i] = 0.0
+                side.bore[i] = 0.0
     for k in range(model.side.shape[0]):
         count_slots(work, k)
 
@@ -277,3 +283,4 @@ def store(model, state, work, g, i, time):
         found.count = side.count[i]
         found.travel = side.travel[i]
         found.first_touch = side.first_touch[i]
+        found.bore = side.bore[i]

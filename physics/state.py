@@ -32,6 +32,7 @@ FOUND = np.dtype(
         ("count", "i8"),  # candidates
         ("travel", "f8"),  # m that both solids may still move before candidates are missing
         ("first_touch", "f8"),  # s, NaN before
+        ("bore", "f8"),  # weight of the samples that touched in the last step, of springs
     ],
     align=True,
 )
@@ -63,6 +64,7 @@ def candidate_dtype(features: Features) -> np.dtype:
         fields.append(("blow", "f8", (3, LANES)))
     else:
         fields.append(("impact_speed", "f8", (LANES,)))  # m/s, see overlap_force
+        fields.append(("approach", "f8", (LANES,)))  # m/s, in the last step
     if features.friction and not features.viscous:
         fields.append(("shear", "f8", (3, LANES)))  # m
         if features.impulse:

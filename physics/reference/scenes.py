@@ -5,6 +5,7 @@ the component g sin(theta) along +x.
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,27 @@ def block_on_ground(
     material = Material(friction, restitution, stiffness)
     gravity = tilted_gravity(angle)
     return _on_ground(Box(half_extents), half_extents[2], material, gravity, **body)
+
+
+def landing_cube(on: str, restitution: float, friction: float = 0.0, along: float = 0.0) -> Scene:
+    """A cube that lands at 1 m/s, without gravity, on its "face", "edge" or "corner".
+
+    What lands first lies straight below the centre; `along` m/s is the speed over the ground.
+    """
+    half = CUBE.half_extents[0]
+    corners = {"face": (0.0, 0.0, 1.0), "edge": (0.0, 1.0, 1.0), "corner": (1.0, 1.0, 1.0)}
+    lowest = np.array(corners[on])
+    reach = half * float(np.linalg.norm(lowest))
+    # the turn by which `lowest` comes to point down, the shortest but for the face's half turn
+    axis = np.cross(lowest, (0.0, 0.0, -1.0))
+    axis = axis if axis.any() else np.array([1.0, 0.0, 0.0])
+    angle = math.acos(-lowest[2] * half / reach)
+    x, y, z = np.sin(0.5 * angle) * axis / np.linalg.norm(axis)
+    scene = block_on_ground(
+        friction=friction, restitution=restitution, position=(0, 0, reach + 0.01),
+        linear_velocity=(along, 0, -1.0), orientation=(x, y, z, math.cos(0.5 * angle)),
+    )  # fmt: skip
+    return replace(scene, gravity=(0.0, 0.0, 0.0))
 
 
 def sphere_on_ground(

@@ -52,6 +52,7 @@ def make_search(features):
         row.load[i] = old[cursor].load if known else 0.0
         if not impulse:
             row.impact_speed[i] = old[cursor].impact_speed if known else 0.0
+            row.approach[i] = old[cursor].approach if known else 0.0
         for axis in range(3):
             if impulse:
                 row.blow[axis, i] = 0.0
@@ -72,6 +73,7 @@ def make_search(features):
         memory.load = row.load[i]
         if not impulse:
             memory.impact_speed = row.impact_speed[i]
+            memory.approach = row.approach[i]
         for axis in range(3):
             if friction:
                 memory.shear[axis] = row.shear[axis, i]
@@ -89,6 +91,7 @@ def make_search(features):
         row.load[i] = 0.0
         if not impulse:
             row.impact_speed[i] = 0.0
+            row.approach[i] = 0.0
         if box:
             row.face[i] = 0.0
         for axis in range(3):
@@ -286,6 +289,7 @@ def make_forget(features):
                         clear(state.candidate[g, side.first_slot + n], i)
                     meeting.count[i] = 0
                     meeting.travel[i] = -1.0
+                    meeting.bore[i] = 0.0
         for i in range(LANES):
             lane.keeps[i] = lane.stale[i]
 

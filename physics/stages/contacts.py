@@ -45,14 +45,15 @@ def make_loop(features, kind, report):
     touch = make_touch(kind)
 
     @kernel
-    def loop(slots, candidate, seen, active, constants, h, rows):
+    def loop(slots, candidate, seen, active, constants, meeting, h, rows):
         R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
         force, torque, pressed = seen.force, seen.torque, seen.pressed
         radius, owner_radius = constants.radius, constants.owner_radius
         ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
         k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
         shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
-        mu, inverse_mass = constants.friction, 1.0 / constants.pair_mass
+        mu, share, bearing = constants.friction, meeting.share, meeting.bearing
+        inverse_mass = 1.0 / constants.pair_mass
         sharp = constants.sharp != 0
         rolling, spinning = constants.rolling, constants.spinning
         twist_k, twist_c = constants.twist_stiffness, constants.twist_damping
@@ -60,8 +61,10 @@ def make_loop(features, kind, report):
         for n in range(slots):
             row = candidate[n]
             weights, memories, loads = row.weight, row.impact_speed, row.load
+            befores = row.approach
             for i in range(LANES):
                 weight = weights[i]
+                borne = max(share[i], weight)  # at first touch, its own is known
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
@@ -69,7 +72,10 @@ def make_loop(features, kind, report):
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
                 approach = -uz if plane else -(ux * nx + uy * ny + uz * nz)
-                normal, memory, load = normal_force(
+                memory = memories[i]
+                if box:  # out by another face is another contact
+                    memory = memory if (face == row.face[i]) | (not sharp) else 0.0
+                normal, memory = normal_force(
                     overlap,
                     approach,
                     k,
@@ -77,18 +83,21 @@ def make_loop(features, kind, report):
                     floor,
                     inverse_mass,
                     h,
-                    mass_rate,
-                    memories[i],
+                    mass_rate / borne,
+                    memory,
                     loads[i],
+                    befores[i],
                 )
                 # an empty slot stays empty, whatever its lane is up to
                 normal = normal if weight > 0.0 else 0.0
                 memory = memory if weight > 0.0 else 0.0
-                load = load if weight > 0.0 else 0.0
                 # a step of no length is a look, and a lane at rest has no step: neither is kept
                 lasts = (h > 0.0) & (active[i] != 0)
                 memories[i] = memory if lasts else memories[i]
-                loads[i] = load if lasts else loads[i]
+                loads[i] = normal if lasts else loads[i]
+                kept = approach if weight > 0.0 else 0.0
+                befores[i] = kept if lasts else befores[i]
+                bearing[i] += weight if normal > 0.0 else 0.0
                 if box:
                     face = face if weight > 0.0 else 0.0
                     row.face[i] = face if lasts else row.face[i]
@@ -213,22 +222,32 @@ def make_side(features, report):
         seen = owner if kind == PLANE else work.relative[0]
         for i in range(LANES):
             seen.pressed[i] = 0.0
+        place_shares(model, work, k)
         if plane and kind == PLANE:
-            plane_loop(slots, candidate, owner, active, constants, h, out)
+            plane_loop(slots, candidate, owner, active, constants, meeting, h, out)
         if others and kind != PLANE:
             relative_pose(owner, surface, seen)
             relative_motion(owner, surface, seen)
             if sphere and kind == SPHERE:
-                sphere_loop(slots, candidate, seen, active, constants, h, out)
+                sphere_loop(slots, candidate, seen, active, constants, meeting, h, out)
             if box and kind == BOX:
-                box_loop(slots, candidate, seen, active, constants, h, out)
+                box_loop(slots, candidate, seen, active, constants, meeting, h, out)
             if capsule and kind == CAPSULE:
-                capsule_loop(slots, candidate, seen, active, constants, h, out)
+                capsule_loop(slots, candidate, seen, active, constants, meeting, h, out)
             if particles and kind == PARTICLES:
-                particle_loop(slots, candidate, seen, active, constants, h, out)
+                particle_loop(slots, candidate, seen, active, constants, meeting, h, out)
             add_wrenches(owner, surface, seen)
 
     return side
+
+
+@stage
+def place_shares(model, work, k):
+    """Notes which share of the pair's stiffness bore in the last step, of both sides together."""
+    meeting, mirror = work.side[k], model.side[k].mirror
+    for i in range(LANES):
+        meeting.share[i] = meeting.bore[i] + (work.side[mirror].bore[i] if mirror >= 0 else 0.0)
+        meeting.bearing[i] = 0.0
 
 
 @stage
@@ -269,5 +288,11 @@ def make_contacts(features):
                 owner = work.solid[constants.owner]
                 seen = owner if constants.kind == PLANE else work.relative[0]
                 note_touch(work, k, seen.pressed, elapsed)
+        keeps = work.lane[0].keeps
+        for k in range(model.side.shape[0]):
+            meeting = work.side[k]
+            for i in range(LANES):
+                bearing = meeting.bearing[i] if meeting.slots > 0 else 0.0
+                meeting.bore[i] = bearing if keeps[i] != 0 else meeting.bore[i]
 
     return contacts

@@ -13,6 +13,8 @@ which `damping_coefficient` solves for a. Two details make the discrete law as g
   phi (k d + c u) + (1 - phi) L, phi = (1 - exp(-x)) / x. For exp(-x) stands 1/(1 + x + x^2/2):
   second order, and a damping however strong takes at most the whole approach speed.
   L follows from the last step, L = f + m (u - u_before) / h, kept within 0 and k d.
+  A face, an edge and a corner bear different shares W of the pair's stiffness, however many samples
+  stand for them. f is that of a whole face, so for L it moves m / W, with the W that last touched.
 - The kick of a step is the mean force over the step centred at the present position, along which
   the overlap moves by b = h |u| / 2 either way: where it crosses zero, the mean of max(0, d) is
   (d + b)^2 / (4 b). Restitution no longer depends on where in a step the touch falls: at
@@ -90,8 +92,8 @@ def rest_speed(damping: float, gravity: float, omega: float) -> float:
 
 
 @stage
-def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, memory, load):
-    """Normal force [N] of a sample that carries the whole pair's stiffness, and its new memories.
+def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, memory, load, before):
+    """Normal force [N] of a sample that carries the whole pair's stiffness, and its new memory.
 
     Args:
         overlap: m; negative if apart.
@@ -101,9 +103,10 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
         floor: m/s.
         inverse_mass: 1/kg of the pair.
         h: s.
-        mass_rate: kg/s, the pair's mass over h.
+        mass_rate: kg/s, m / (W h).
         memory: m/s, impact speed, negative while separating, 0 while apart.
-        load: N, last step's force less mass_rate times its approach.
+        load: N, last step's force.
+        before: m/s, last step's approach.
     """
     b = 0.5 * h * abs(approach) + 1e-30
     s = overlap + b
@@ -114,7 +117,7 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     turned = (memory < 0.0) & (approach > 0.0)
     speed = 0.0 if turned else abs(memory)
     speed = max(max(speed, approach), floor)
-    outside = load + mass_rate * approach if memory != 0.0 else 0.0
+    outside = load + mass_rate * (approach - before) if memory != 0.0 else 0.0
     outside = min(max(outside, 0.0), k * max(overlap, 0.0))
     # a pressed contact is at rest under its load as a lying body is under its weight
     slowest = max(speed, a * outside * math.sqrt(inverse_mass / k))
@@ -124,18 +127,21 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     force = (k * (slowest * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * outside) / (
         r * r + r * x + 0.5 * x * x
     )
-    touching = s > 0.0
+    # what is met only by the mean over the drift, and leaves already, has never been met
+    touching = (s > 0.0) & ((memory != 0.0) | (approach > 0.0) | (overlap > 0.0))
     force = force if touching & (force > 0.0) else 0.0
     memory = speed if approach > 0.0 else -speed
     memory = memory if touching else 0.0
-    return force, memory, force - mass_rate * approach
+    return force, memory
 
 
 @stage
-def dashpot_force(overlap, approach, k, zeta, floor, inverse_mass, h, mass_rate, memory, load):
+def dashpot_force(
+    overlap, approach, k, zeta, floor, inverse_mass, h, mass_rate, memory, load, before
+):
     """As `overlap_force`, by the clamped linear dashpot; damping is exact over a step."""
     rate = 2.0 * zeta * math.sqrt(k * inverse_mass)
     x = rate * h
     force = k * overlap + rate / inverse_mass * approach * (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
     force = force if (overlap > 0.0) & (force > 0.0) else 0.0
-    return force, 0.0, 0.0
+    return force, 0.0

@@ -251,10 +251,12 @@ def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction):
     assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=1e-2)
 
 
-@pytest.mark.parametrize(("fidelity", "most"), [("balanced", 1.5e-3), ("accurate", 1e-5)])
+@pytest.mark.parametrize(
+    ("fidelity", "most"), [("fast", 1e-5), ("balanced", 0.0), ("accurate", 0.0)]
+)
 @pytest.mark.parametrize("shapes", [(CUBE,), (BALL,), (CUBE, CUBE), (CUBE, BALL)])
-def test_a_collision_gains_no_energy_but_that_of_the_step(shapes, fidelity, most):
-    """What friction remembers is paid for; what is left falls with the step."""
+def test_no_grazing_collision_gains_energy(shapes, fidelity, most):
+    """What friction remembers is paid for, and what has never been met pushes nothing away."""
     for restitution, friction in ((0.95, 0.01), (0.95, 0.5), (0.95, 2.0), (0.5, 2.0)):
         assert energy_gain(grazing(shapes, restitution, friction, fidelity)) <= most
 

@@ -70,29 +70,6 @@ def test_a_cube_that_lands_flat_leaves_flat(spacing, speed):
     assert np.abs(world.angular_velocity).max() < 1e-3 * speed / 0.02
 
 
-@pytest.mark.parametrize("turn", ["face", "edge", "corner"])
-@pytest.mark.parametrize("spacing", [1.0, 0.5, 0.25])
-def test_restitution_is_that_of_the_point_however_a_cube_lands(turn, spacing):
-    """Newton's ratio at what touches, whatever it is and however many samples it has."""
-    tilt = {"face": 0.0, "edge": math.pi / 4, "corner": math.acos(1 / math.sqrt(3))}[turn]
-    axis = np.array([1.0, 1.0, 0.0]) if turn == "corner" else np.array([1.0, 0.0, 0.0])
-    if turn == "corner":
-        # the diagonal (1, 1, 1) points down
-        axis = np.cross([1.0, 1.0, 1.0], [0.0, 0.0, -1.0])
-        tilt = math.acos(-1 / math.sqrt(3))
-    axis = axis / np.linalg.norm(axis) * math.sin(tilt / 2)
-    reach = {"face": 0.02, "edge": 0.02 * math.sqrt(2), "corner": 0.02 * math.sqrt(3)}[turn]
-    scene = scenes.block_on_ground(
-        restitution=0.5, position=(0, 0, reach + 0.01), linear_velocity=(0, 0, -1.0),
-        orientation=(*axis, math.cos(tilt / 2)),
-    )  # fmt: skip
-    world = World(replace(scene, gravity=(0, 0, 0)), replace(SOLID, spacing=spacing))
-    world.advance(0.05)
-    # straight over what touches: no lever
-    assert world.linear_velocity[0, 0, 2] == pytest.approx(0.5, rel=1e-5)
-    assert np.abs(world.angular_velocity).max() < 0.1
-
-
 CUBE, BALL = Box((0.02, 0.02, 0.02)), Sphere(0.025)
 
 

@@ -112,7 +112,7 @@ def test_restitution_lies_between_zero_and_one(value):
 def test_a_vector_has_three_finite_numbers(kind, field):
     refused(kind, field, (1.0, 2.0), ValueError, "3 numbers (x, y, z)", "(1.0, 2.0)")
     refused(kind, field, 1.0, ValueError, "3 numbers (x, y, z)")
-    refused(kind, field, [[1.0, 2.0, 3.0]], ValueError, "3 numbers (x, y, z)", "(1, 3)")
+    refused(kind, field, [[1.0, 2.0, 3.0]], ValueError, "3 numbers (x, y, z)", "[[1.0, 2.0, 3.0]]")
     refused(kind, field, (1.0, math.nan, 1.0), ValueError, "finite", "nan")
     refused(kind, field, (1.0, math.inf, 1.0), ValueError, "finite", "inf")
     refused(kind, field, "abc", TypeError, "3 numbers", "'abc'")

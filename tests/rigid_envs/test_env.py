@@ -306,10 +306,13 @@ def test_what_is_no_state_is_refused(env, state):
 def test_a_state_of_another_version_fidelity_or_count_is_refused(env):
     state = {**env.get_state(), "version": 99}
     assert_refused(env, lambda: env.set_state(state), ValueError, "version 99, this is version")
-    for other in (Runner("push", 1, fidelity="accurate"), Runner("push", 2)):
+    for other, what in (
+        (Runner("push", 1, fidelity="accurate"), "fidelity"),
+        (Runner("push", 2), "count"),
+    ):
         other.reset(np.ones(other.count, dtype=bool), np.arange(other.count))
         state = other.get_state()
-        assert_refused(env, lambda s=state: env.set_state(s), ValueError, "another scene")
+        assert_refused(env, lambda s=state: env.set_state(s), ValueError, f"another {what}")
 
 
 def test_a_world_that_diverges_says_so_and_starts_anew_with_the_next_reset(env):
