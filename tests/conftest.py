@@ -1,6 +1,7 @@
 import os
 
 import hypothesis
+import pytest
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 
@@ -8,3 +9,9 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 hypothesis.settings.register_profile("default", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("stress", deadline=None, max_examples=2000)
 hypothesis.settings.load_profile("default")
+
+
+@pytest.fixture
+def stress():
+    """Whether `make stress` runs."""
+    return hypothesis.settings.default.max_examples > 100

@@ -47,7 +47,7 @@ def test_the_wave_along_dominoes_converges_with_the_step():
 
 @pytest.mark.parametrize(
     ("degrees", "fidelity"),
-    [(10.0, "balanced"), (20.0, "balanced"), (20.0, "solid"), (25.0, "solid")],
+    [(d, f) for f in ("balanced", "solid") for d in (10.0, 20.0, 25.0)],
 )
 def test_two_cards_lean_against_each_other(degrees, fidelity):
     world = settled(scenes.leaning_cards(math.radians(degrees)), fidelity)

@@ -84,12 +84,13 @@ def lowest_point(observation):
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
-def test_two_hundred_thousand_blind_steps_stay_physical(fidelity):
+def test_blind_steps_stay_physical(fidelity, stress):
+    """200,000 random and bang-bang actions, and a million under stress."""
     envs = make_vec(1024, fidelity=fidelity)
     envs.reset(seed=0)
     world = envs._runner.world
     most = 0.0
-    for observation, *_, info in steps_of(envs, random_actions(200, 1024)):
+    for observation, *_, info in steps_of(envs, random_actions(1000 if stress else 200, 1024)):
         inside = ~info["out_of_bounds"]
         assert all(np.isfinite(values).all() for values in observation.values())
         energy = world.kinetic_energy() + world.potential_energy()
