@@ -9,6 +9,7 @@ from physics import (
     Body,
     Box,
     Capsule,
+    ContactOverflow,
     Drive,
     Fidelity,
     Ground,
@@ -391,6 +392,21 @@ def test_cubes_of_particles_collide_and_conserve_momentum():
     assert np.abs(world.linear_momentum() - linear).max() < 1e-15
     assert np.abs(world.angular_momentum() - angular).max() < 1e-16
     assert np.all(world.kinetic_energy() <= energy * (1 + 1e-3))
+
+
+def test_more_particle_pairs_than_there_is_room_for_are_named_and_harm_no_other_world():
+    cubes = [Body(CUBE, mass=0.1, position=(x, 0, 0.1)) for x in (0.0, 0.1)]
+    fidelity = Fidelity(geometry="particle", spacing=0.25, skin=1.0)
+    world = World(Scene(cubes, [Ground()]), fidelity, count=3)
+    alone = World(Scene(cubes, [Ground()]), fidelity)
+    world.set_state(position=[(0, 0, 0.1), (0.01, 0, 0.1)], worlds=np.array([False, True, False]))
+    with pytest.raises(ContactOverflow, match=r"worlds \[1\]: .* particle pairs a particle"):
+        world.advance(0.04)
+    alone.advance(0.04)
+    np.testing.assert_array_equal(world.position[[0, 2]], np.repeat(alone.position, 2, axis=0))
+    world.reset(np.array([False, True, False]))
+    world.advance(0.04)
+    np.testing.assert_array_equal(world.position[1], alone.position[0])
 
 
 def test_cubes_of_particles_rest_on_the_ground():
