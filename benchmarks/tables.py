@@ -27,11 +27,9 @@ def saved() -> tuple[dict[str, Any], dict[str, Table]]:
 
 def _without(table: Table, column: str) -> Table:
     """A table less a column, and less the rows that have nothing else."""
-    if column not in table.columns:
-        return table
-    at = table.columns.index(column)
-    rows = [row[:at] + row[at + 1 :] for row in table.rows if row[0] != column]
-    return table._replace(columns=table.columns[:at] + table.columns[at + 1 :], rows=rows)
+    kept = [i for i, name in enumerate(table.columns) if name != column]
+    rows = [[row[i] for i in kept] for row in table.rows if row[0] != column]
+    return table._replace(columns=[table.columns[i] for i in kept], rows=rows)
 
 
 def readme(text: str) -> str:

@@ -152,7 +152,7 @@ def setting(words: str) -> tuple[str, Fidelity]:
                 "Fidelity, as substep=1e-3,contact_resolution=0.3"
             )
         try:
-            fields[name.strip()] = float(value)
+            fields[name.strip()] = int(value) if value.strip().isdigit() else float(value)
         except ValueError:
             fields[name.strip()] = value.strip()
     try:

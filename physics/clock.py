@@ -42,24 +42,6 @@ def first_diverged(model, work, i):
     return 0
 
 
-@kernel
-def change_step(model, state, work, g, h):
-    """Keeps impulses what they are where the last step had another length than the next.
-
-    They are stored as forces, of which the first half kick of the next step gives its share.
-    """
-    for i in range(LANES):
-        if work.lane[0].active[i]:
-            status = state.world[g * LANES + i]
-            share = status.step / h if status.step > 0.0 else 1.0
-            status.step = h
-            for m in range(model.mover.shape[0]):
-                solid, weight = work.solid[m], model.mover[m].weight
-                for c in range(3):
-                    solid.force[c, i] = weight[c] + share * (solid.force[c, i] - weight[c])
-                    solid.torque[c, i] *= share
-
-
 @cache
 def make_write_back(features: Features):
     """Stage that writes lanes back to their worlds: the diverged ones, and in the end all."""
@@ -118,8 +100,6 @@ def make_advance(features: Features):
             look = stale > 0
             if look:
                 forget(model, state, work, g)
-            if features.impulse:
-                change_step(model, state, work, g, h)
             done = 0
             while True:
                 together = min(collision_substeps, substeps - done)

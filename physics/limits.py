@@ -17,23 +17,34 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
         ValueError: a Material.stiffness or Drive.frequency that makes it unstable, with what binds
             it and the largest safe step; a body that would sink into the ground.
     """
-    _check_sink(scene, fidelity)
+    _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
     _check_stiffness(scene, fidelity, model, features)
 
 
-def _check_sink(scene: Scene, fidelity: Fidelity) -> None:
-    """A step so long that what lies on the ground would sink into it is a slip of the pen."""
-    h, gravity = fidelity.substep, math.hypot(*scene.gravity)
-    softest = fidelity.contact_resolution / h
-    for i, body in enumerate(scene.bodies):
-        width = body.shape.width
-        if gravity > 0.5 * width * softest**2 and body.material.stiffness is None:
-            longest = fidelity.contact_resolution * math.sqrt(0.5 * width / gravity)
+def _below(x: float) -> str:
+    """Three digits of a positive number, rounded down: what is told as safe must be."""
+    unit = 10.0 ** (math.floor(math.log10(x)) - 2)
+    return f"{math.floor(x / unit * (1.0 - 1e-12)) * unit:.3g}"
+
+
+def _check_sink(scene: Scene, fidelity: Fidelity, model: Model) -> None:
+    """A step so long that what lies on a static would sink into it is a slip of the pen."""
+    h, gravity, bodies = fidelity.substep, math.hypot(*scene.gravity), len(scene.bodies)
+    if _given_stiffness(scene):
+        return
+    for side in model.side:
+        i = int(side["owner"])
+        if i >= bodies or side["surface"] < len(model.mover):
+            continue
+        width = scene.bodies[i].shape.width
+        sink = gravity * float(side["pair_mass"] / side["stiffness"])
+        if sink > 0.5 * width:
+            longest = _below(h * math.sqrt(0.5 * width / sink))
             raise ValueError(
                 f"Fidelity.substep {h:g} s is too long for body {i}, which is {width:g} m wide and "
-                f"would sink by {gravity / softest**2:.3g} m at rest: at most {longest:.2g} s fit "
-                "it; or build the World with allow_unstable=True"
+                f"would sink by {sink:.3g} m at rest: at most {longest} s fit it; or build the "
+                "World with allow_unstable=True"
             )
 
 
@@ -44,8 +55,8 @@ def _check_servos(scene: Scene, fidelity: Fidelity, model: Model) -> None:
         if h >= longest:
             raise ValueError(
                 f"Drive.frequency {drive.frequency:g} rad/s of drive {i} makes the substep of "
-                f"{h:g} s unstable: the largest safe step is {longest:.3g} s; lower the frequency, "
-                "shorten Fidelity.substep, or build the World with allow_unstable=True"
+                f"{h:g} s unstable: the largest safe step is {_below(longest)} s; lower the "
+                "frequency, shorten Fidelity.substep, or build the World with allow_unstable=True"
             )
 
 
@@ -61,7 +72,7 @@ def _check_stiffness(scene: Scene, fidelity: Fidelity, model: Model, features: F
             step, mover = _safe_step(scene, fidelity, model, features)
         raise ValueError(
             f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: {mover} "
-            f"binds, and the largest safe step is {step:.3g} s; lower the stiffness, shorten "
+            f"binds, and the largest safe step is {_below(step)} s; lower the stiffness, shorten "
             "Fidelity.substep, or build the World with allow_unstable=True"
         )
 
@@ -73,7 +84,7 @@ def cause_of_divergence(
     step, mover = _safe_step(scene, fidelity, model, features)
     if h > step and _given_stiffness(scene):
         return (
-            f"the substep of {h:g} s is longer than the largest safe one, {step:.3g} s, which "
+            f"the substep of {h:g} s is longer than the largest safe one, {_below(step)} s, which "
             f"{mover} sets"
         )
     return "a state, speed or force too large for double precision"

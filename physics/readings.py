@@ -156,7 +156,7 @@ class Readings:
         if not diagnostics.between(self._model, *ends).any():
             raise ValueError(
                 f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
-                "one solid, or two of which neither is a body that moves freely"
+                "one solid, or two statics, never do"
             )
         self._settle()
         return diagnostics.first_touch(self._model, self._state, *ends)

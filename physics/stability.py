@@ -8,8 +8,11 @@ omega h < 2 (sqrt(1 + zeta^2) - zeta) for one degree of freedom. Rotation, dampi
 several bodies are all in the matrices.
 
 The normal law relaxes within the step and estimates the load from the last one. With the share phi
-of spring and damper, f = phi (k d + c u) + (1 - phi) (f_before + m (u - u_before) / h), a velocity
-that flips gives A = (phi (h c + h^2 k / 2) + 2 m (1 - phi)) / (2 - phi).
+of spring and damper, f = phi (k d + c u) + (1 - phi) L, L = f_before + m (u - u_before) / h, but at
+most k d, which is what it is at rest: a contact that approaches has L = k d, and one that parts the
+estimate. With u flipping, A is then phi h c + h^2 k / 2 of the one and phi (h c + h^2 k / 2) +
+(1 - phi) (2 m - A of the one) of the other. In a mode that rocks, half of the contacts are either;
+in others they take turns: A is the mean.
 """
 
 import math

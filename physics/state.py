@@ -41,7 +41,6 @@ FOUND = np.dtype(
 STATUS = np.dtype(
     [
         ("time", "f8"),  # s
-        ("step", "f8"),  # s, length of the last substep of the impulse law; 0 before
         ("stale", "i4"),  # 1: set from outside, forces and candidates don't belong to it yet
         ("diverged", "i4"),  # 0, or 1 + index of the first non-finite mover
         ("overflow", "i8"),  # 1: a side had more candidates than room

@@ -41,11 +41,11 @@ class World(Readings):
         fidelity: a preset's name or a Fidelity.
         count: number of worlds, at least 1.
         threads: to share the worlds out over; all cores if None. Results don't depend on it.
-        allow_unstable: accept a Material.stiffness that makes the fidelity's step too long.
+        allow_unstable: accept what makes the fidelity's step too long, see Raises.
 
     Raises:
-        TypeError, ValueError: a bad argument; a stiffness that the step can't carry, with the body
-            that binds it and the largest safe step.
+        TypeError, ValueError: a bad argument; a step that is too long for the scene, see
+            `physics.limits.check_step`.
     """
 
     def __init__(

@@ -13,7 +13,7 @@ import numpy as np
 from physics.group import note_touch
 from physics.jit import LANES, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
-from physics.stages.friction import friction_force, reach, twist_torque, viscous_force
+from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.relative import relative_motion, relative_pose
@@ -75,7 +75,7 @@ def make_loop(features, kind, report):
                 memory = memories[i]
                 if box:  # out by another face is another contact
                     memory = memory if (face == row.face[i]) | (not sharp) else 0.0
-                normal, memory = normal_force(
+                normal, memory, rest = normal_force(
                     overlap,
                     approach,
                     k,
@@ -107,10 +107,9 @@ def make_loop(features, kind, report):
                     fx, fy, fz = normal * nx, normal * ny, normal * nz
                 if friction:
                     sx, sy, sz = row.shear[0, i], row.shear[1, i], row.shear[2, i]
-                    cones = reach(memory, floor)
                     if plane:
                         gx, gy, gz, sx, sy, sz = friction_force(
-                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, cones
+                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, rest
                         )
                         fx += gx
                         fy += gy
@@ -128,7 +127,7 @@ def make_loop(features, kind, report):
                             sx - along * nx,
                             sy - along * ny,
                             sz - along * nz,
-                            cones,
+                            rest,
                         )
                         fx += gx
                         fy += gy

@@ -6,9 +6,11 @@ xi = -(f + c_t u)/k_t (Luding), so the force is continuous when sliding ends.
 
 Where c_t u exceeds the cone, that shear points backwards, and nothing has paid for its energy. In a
 collision N starts at zero, so all slip is too fast: remembered as it is, the shear held friction
-back while N rose, and was returned as energy that the solids never had, up to 11 % when tried. So
-there c_t u counts up to one cone only, and the shear is what slip has paid for. A body that slides
-to rest on a lasting contact needs more of it, as follows; `reach` tells the two apart.
+back while N rose, and was returned as energy that the solids never had, up to 11 % when tried. Nor
+is a shear that slip has paid for to be returned: a rigid body sticks, it doesn't spring back along
+the surface. So contacts that collide have friction by damping alone, within the cone; those that
+last remember, as a body at rest and one that slides to rest need it. The normal law tells them
+apart by their impact speed, over that of a contact that rests under its load: see `rest` there.
 
 That rule also fixes where a body comes to rest. With a = mu g and half-step speeds, sliding ends
 in the step whose speed u falls below c a / k_t, at the shear xi = (m a - c u_before) / k_t, and the
@@ -34,7 +36,8 @@ import math
 
 from physics.jit import stage
 
-# of a body that slides to rest on its rear edge, which bears a third of the mean: see `reach`
+# cones of damping beyond the first that a lasting contact may remember: a body that slides to rest
+# needs several on its rear edge, which bears a third of the mean
 _AT_REST = 10.0
 
 
@@ -61,19 +64,7 @@ def tangential_coefficients(
 
 
 @stage
-def reach(memory, floor):
-    """How many cones of damping a sliding contact may remember: many at rest, one in a collision.
-
-    Args:
-        memory: m/s, the contact's impact speed, see `overlap_force`; 0 if it keeps none.
-        floor: m/s, that of a contact at rest.
-    """
-    rest = floor / max(abs(memory), floor)
-    return 1.0 + _AT_REST * rest * rest
-
-
-@stage
-def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, cones):
+def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, rest):
     """Tangential force of a sample with the whole pair's stiffness, and what it remembers.
 
     Args:
@@ -88,14 +79,15 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, cones):
         sx: m, shear before this step, in the tangent plane.
         sy: likewise.
         sz: likewise.
-        cones: see `reach`.
+        rest: 1 for a contact that lasts, falling to 0 for one that collides.
 
     Returns:
         Force x y z N and shear x y z m.
     """
-    sx += h * ux
-    sy += h * uy
-    sz += h * uz
+    lasting = rest * rest
+    sx = lasting * sx + h * ux
+    sy = lasting * sy + h * uy
+    sz = lasting * sz + h * uz
     fx = -k * sx - c * ux
     fy = -k * sy - c * uy
     fz = -k * sz - c * uz
@@ -107,7 +99,7 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, cones):
     fy *= cut
     fz *= cut
     back = -1.0 / k if normal > 0.0 else 0.0
-    damped = min(c, cones * limit / (against + 1e-60))
+    damped = min(c, (1.0 + _AT_REST * lasting) * limit / (against + 1e-60))
     sx = back * (fx + damped * ux)
     sy = back * (fy + damped * uy)
     sz = back * (fz + damped * uz)
@@ -149,10 +141,10 @@ def twist_torque(normal, wx, wy, wz, nx, ny, nz, k, c, rolling, spinning, h, tx,
     spin, twist = wx * nx + wy * ny + wz * nz, tx * nx + ty * ny + tz * nz
     ax, ay, az, px, py, pz = friction_force(
         normal, wx - spin * nx, wy - spin * ny, wz - spin * nz, k, c, rolling, h,
-        tx - twist * nx, ty - twist * ny, tz - twist * nz, 1.0 + _AT_REST,
+        tx - twist * nx, ty - twist * ny, tz - twist * nz, 1.0,
     )  # fmt: skip
     along, _, _, turn, _, _ = friction_force(
-        normal, spin, 0.0, 0.0, k, c, spinning, h, twist, 0.0, 0.0, 1.0 + _AT_REST
+        normal, spin, 0.0, 0.0, k, c, spinning, h, twist, 0.0, 0.0, 1.0
     )
     return (
         ax + along * nx,

@@ -20,7 +20,7 @@ import math
 from functools import cache
 
 from physics.jit import LANES, kernel, stage
-from physics.stages.points import ends, give, slip
+from physics.stages.points import cross, ends, give, slip
 
 # Rounds end when none has changed a speed by more than this share of the fastest approach, or after
 # so many
@@ -139,17 +139,48 @@ def rebound(points, owner, surface, A, B, ma, mb, lane, again):
 
 
 @stage
-def book_hits(model, work):
-    """Counts the collision's impulses among what this step gave."""
+def book_hits(model, work, look):
+    """Changes momenta by the collision's impulses; at a look, counts them among the forces."""
     for k in range(model.side.shape[0]):
-        first = model.side[k].first_slot
-        for n in range(first, first + work.side[k].slots):
+        side = model.side[k]
+        owner, surface = work.solid[side.owner], work.solid[side.surface]
+        P, L, Q, M = (
+            owner.momentum,
+            owner.angular_momentum,
+            surface.momentum,
+            surface.angular_momentum,
+        )
+        for n in range(side.first_slot, side.first_slot + work.side[k].slots):
             point = work.point[n]
-            for axis in range(3):
-                for i in range(LANES):
-                    point.spent[axis, i] += (
-                        point.hit[i] * point.normal[axis, i] + point.skid[axis, i]
-                    )
+            for i in range(LANES):
+                hit = point.hit[i]
+                px = hit * point.normal[0, i] + point.skid[0, i]
+                py = hit * point.normal[1, i] + point.skid[1, i]
+                pz = hit * point.normal[2, i] + point.skid[2, i]
+                if look:
+                    point.spent[0, i] += px
+                    point.spent[1, i] += py
+                    point.spent[2, i] += pz
+                    continue
+                P[0, i] += px
+                P[1, i] += py
+                P[2, i] += pz
+                Q[0, i] -= px
+                Q[1, i] -= py
+                Q[2, i] -= pz
+                tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], px, py, pz)
+                L[0, i] += tx
+                L[1, i] += ty
+                L[2, i] += tz
+                bx, by, bz = (
+                    point.surface_arm[0, i],
+                    point.surface_arm[1, i],
+                    point.surface_arm[2, i],
+                )
+                tx, ty, tz = cross(bx, by, bz, px, py, pz)
+                M[0, i] -= tx
+                M[1, i] -= ty
+                M[2, i] -= tz
 
 
 @cache
@@ -188,7 +219,7 @@ def make_impacts(features):
                 rebound(points, a, b, A, B, ma, mb, work.lane[0], again)
 
     @kernel
-    def collide(model, work):
+    def collide(model, work, look):
         lane = work.lane[0]
         for i in range(LANES):
             lane.work[i] = 0.0
@@ -203,7 +234,7 @@ def make_impacts(features):
             lane.share[i] = math.sqrt(allowed / won) if won > allowed else 1.0
         restitute(model, work, True)
         press_all(model, work, True)
-        book_hits(model, work)
+        book_hits(model, work, look)
 
     @kernel
     def find_all(model, work, h):
@@ -223,7 +254,7 @@ def make_impacts(features):
         return lanes
 
     @stage
-    def impacts(model, work, h):
+    def impacts(model, work, h, look):
         if find_all(model, work, h) == 0:
             return
         for k in range(model.side.shape[0]):
@@ -232,6 +263,6 @@ def make_impacts(features):
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                 retract(points, a, b, A, B, ma, mb, work.lane[0].struck)
         if find_all(model, work, h) > 0:
-            collide(model, work)
+            collide(model, work, look)
 
     return impacts

@@ -307,7 +307,7 @@ def make_impulses(features):
                 points(model, state, work, g, k, work.lane[0].keeps, h)
         # bodies collide with the speeds of now
         outside(model, work, 0.5 * drifted)
-        impacts(model, work, h)
+        impacts(model, work, h, drifted == 0.0)
         outside(model, work, -0.5 * drifted)
         correct(model, work, h, False)
         outside(model, work, h)

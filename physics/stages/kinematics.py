@@ -96,6 +96,10 @@ def make_kinematics(features):
             for i in range(LANES):
                 place(solid, i)  # a drive's too: it never turns, but may stand askew
             if not constants.turns:
+                for i in range(LANES):
+                    omega[0, i] = 0.0
+                    omega[1, i] = 0.0
+                    omega[2, i] = 0.0
                 continue
             for i in range(LANES):
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]

@@ -32,6 +32,8 @@ import math
 
 from physics.jit import stage
 
+# of the speed that a contact's load gives it in 1/omega, below which it doesn't count as colliding
+_CALM = 2.0
 # below this restitution the approach ends within the step's resolution anyway
 _LEAST_RESTITUTION = 5e-4
 
@@ -93,7 +95,9 @@ def rest_speed(damping: float, gravity: float, omega: float) -> float:
 
 @stage
 def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, memory, load, before):
-    """Normal force [N] of a sample that carries the whole pair's stiffness, and its new memory.
+    """Normal force [N] of a sample that carries the whole pair's stiffness, its new memory, `rest`.
+
+    `rest` is 1 for a contact that lasts and falls to 0 with the speed of a collision.
 
     Args:
         overlap: m; negative if apart.
@@ -120,7 +124,8 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     outside = load + mass_rate * (approach - before) if memory != 0.0 else 0.0
     outside = min(max(outside, 0.0), k * max(overlap, 0.0))
     # a pressed contact is at rest under its load as a lying body is under its weight
-    slowest = max(speed, a * outside * math.sqrt(inverse_mass / k))
+    loaded = outside * math.sqrt(inverse_mass / k)
+    slowest = max(speed, a * loaded)
     y = a * S
     x = h * k * inverse_mass * y
     r = slowest * D
@@ -132,7 +137,9 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     force = force if touching & (force > 0.0) else 0.0
     memory = speed if approach > 0.0 else -speed
     memory = memory if touching else 0.0
-    return force, memory
+    # as slow as its load would make it in a step or two, it lasts
+    calm = max(floor, max(a, _CALM) * loaded)
+    return force, memory, min(1.0, calm / max(slowest, 1e-300))
 
 
 @stage
@@ -144,4 +151,4 @@ def dashpot_force(
     x = rate * h
     force = k * overlap + rate / inverse_mass * approach * (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
     force = force if (overlap > 0.0) & (force > 0.0) else 0.0
-    return force, 0.0
+    return force, 0.0, 1.0

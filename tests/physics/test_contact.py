@@ -236,9 +236,11 @@ def test_a_ball_rolls_down_an_incline_at_five_sevenths_or_slides(degrees):
     assert world.linear_velocity[0, 0, 0] - before == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("friction", [0.05, 0.1, 0.2, 0.3])
-def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction):
-    along, down, restitution, radius = 2.0, 1.0, 0.5, 0.1
+@pytest.mark.parametrize("along", [2.0, 0.5])
+@pytest.mark.parametrize("friction", [0.05, 0.1, 0.2, 0.3, 1.0])
+def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction, along):
+    """Sliding through, and sticking before the end."""
+    down, restitution, radius = 1.0, 0.5, 0.1
     scene = scenes.sphere_on_ground(
         radius, friction, restitution, gravity=0.0, position=(0, 0, 0.11),
         linear_velocity=(along, 0, -down),
@@ -246,7 +248,7 @@ def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction):
     world = World(scene, "accurate")
     world.advance(0.5)
     x, z, spin = closed_forms.oblique_impact(along, down, friction, restitution, radius)
-    assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=1e-3)
+    assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=2e-3)
     assert world.linear_velocity[0, 0, 2] == pytest.approx(z, abs=1e-3)
     # the overlap shortens the lever by about 1 mm / 2
     assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=1e-2)

@@ -63,11 +63,43 @@ def test_under_gravity_restitution_is_right_in_the_mean_over_the_phases_of_touch
 
 def test_a_collision_is_whole_whatever_the_next_frame_is_long():
     world = World(ball(1.0, 1.0, height=0.0235, gravity=0.0), "solid")
-    world.advance(2 * STEP)  # ends with the half of the collision that the next step completes
-    assert abs(world.linear_velocity[0, 0, 2]) < 1e-12
+    world.advance(2 * STEP)  # ends with the collision
+    assert world.linear_velocity[0, 0, 2] == pytest.approx(1.0, abs=1e-12)
     world.advance(0.05 * STEP)
     world.advance(0.05 * STEP)
     assert world.linear_velocity[0, 0, 2] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_cube_at_rest_stays_so_through_frames_of_changing_length():
+    world = World(scenes.block_on_ground(), "solid")
+    world.advance(1.0)
+    height = world.position[0, 0, 2]
+    for _ in range(200):
+        world.advance(STEP)
+        world.advance(0.3 * STEP)
+        assert np.abs(world.linear_velocity).max() < 1e-5
+    assert world.position[0, 0, 2] == pytest.approx(height, abs=1e-7)
+
+
+def test_a_free_tool_moves_alike_whatever_frames_are_long():
+    tool = Drive(Sphere(0.01), mass=0.05, force_limit=5.0, position=(0, 0, 0.1))
+    cube = Body(CUBE, mass=0.1, position=(0.5, 0, 0.02))
+    world = World(Scene([cube], [Ground()], [tool]), "solid")
+    world.command_drives((10.0, 0.0, 0.0))
+    world.advance(0.01)
+    world.advance(1e-4)
+    assert world.drive_velocity[0, 0, 0] == pytest.approx(100.0 * 0.0101, rel=1e-3)
+
+
+def test_a_reset_neighbour_changes_nothing_when_frames_change_their_length():
+    worlds = [World(scenes.block_on_ground(), "solid", count=2) for _ in range(2)]
+    for world, resets in zip(worlds, (True, False), strict=True):
+        world.advance(0.05)
+        world.advance(0.0005)
+        if resets:
+            world.reset(np.array([False, True]))
+        world.advance(0.02)
+    np.testing.assert_array_equal(worlds[0].position[0], worlds[1].position[0])
 
 
 def test_the_force_reported_is_that_which_the_momentum_shows():
@@ -114,10 +146,12 @@ def test_what_touches_nothing_changes_no_collision():
     np.testing.assert_array_equal(found[0], found[1])
 
 
-def test_a_world_that_diverges_takes_no_other_with_it():
-    world = World(scenes.block_on_ground(), "solid", count=24, threads=1)
+@pytest.mark.parametrize("speed", [1e200, 1e305])
+@pytest.mark.parametrize("scene", [scenes.block_on_ground(), scenes.push_like()])
+def test_a_world_that_diverges_takes_no_other_with_it(scene, speed):
+    world = World(scene, "solid", count=24, threads=1)
     velocity = np.zeros((24, 1, 3))
-    velocity[3] = 1e305
+    velocity[3] = speed
     world.set_state(linear_velocity=velocity)
     with pytest.raises(SimulationDiverged) as error:
         world.advance(0.1)

@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import math
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -640,3 +641,22 @@ def test_looking_at_a_state_just_set_changes_no_bit_of_what_follows():
         world.advance(0.1)
     np.testing.assert_array_equal(worlds[0].position, worlds[1].position)
     np.testing.assert_array_equal(worlds[0].angular_velocity, worlds[1].angular_velocity)
+
+
+# --- steps that are too long --------------------------------------------------------------------
+
+
+def test_a_step_in_which_a_body_would_sink_by_half_its_width_is_refused_with_one_that_fits():
+    scene = scenes.block_on_ground()
+    with pytest.raises(ValueError, match=r"substep 2 s .* body 0, .* sink by 157 m") as error:
+        World(scene, Fidelity(substep=2.0))
+    longest = float(re.search(r"at most (\S+) s", str(error.value))[1])
+    World(scene, Fidelity(substep=longest))
+    with pytest.raises(ValueError, match="too long"):
+        World(scene, Fidelity(substep=1.02 * longest))
+    World(scene, Fidelity(substep=2.0), allow_unstable=True)
+
+
+def test_a_body_that_meets_nothing_or_has_its_own_stiffness_may_have_any_step():
+    World(Scene([Body(Sphere(0.02), mass=0.1)]), Fidelity(substep=1.0))
+    World(scenes.block_on_ground(stiffness=10.0), Fidelity(substep=0.01))
