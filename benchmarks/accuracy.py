@@ -90,7 +90,7 @@ def measure() -> Iterator[Table]:
         ratio = theirs / ours if theirs < 1e6 * ours else "> 1e6"
         rows.append([name, bar, *errors.values(), ratio])
     columns = ["error", "bar", *engines, "MuJoCo / balanced"]
-    yield Table("accuracy", "Sliding, resting, rolling; μ = 0.5", columns, rows)
+    yield Table("accuracy", "Relative errors in sliding, resting, rolling; μ = 0.5", columns, rows)
 
     title = f"Sphere on a plane without gravity, worst of {PHASES} touch phases"
     yield Table("restitution", title, ["error", "bar", *PRESETS], list(restitution_rows()))

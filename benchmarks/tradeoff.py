@@ -29,6 +29,7 @@ from physics.reference.measures import (
     stand,
 )
 from physics.reference.scenes import CUBE, tower
+from physics.validation import positive
 
 TOWERS = (5, 10)
 TIME = 10.0  # s
@@ -161,15 +162,31 @@ def setting(words: str) -> tuple[str, Fidelity]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def _cubes(word: str) -> int:
+    if not word.isdigit() or int(word) < 1:
+        raise argparse.ArgumentTypeError(f"a tower has at least one cube, got {word!r}")
+    return int(word)
+
+
+def _time(word: str) -> float:
+    try:
+        return positive("--time", float(word))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def run() -> None:
     """Measures the settings named, or all."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tradeoff", description=__doc__)
     parser.add_argument(
         "settings", nargs="*", type=setting,
-        help=f"{', '.join(SETTINGS)}; or fields of a Fidelity, as substep=1e-3,skin=0.2",
+        help=f"{', '.join(map(repr, SETTINGS))}; or fields of a Fidelity, as substep=1e-3,skin=0.2",
     )  # fmt: skip
-    parser.add_argument("--towers", nargs="*", type=int, default=TOWERS, metavar="CUBES")
-    parser.add_argument("--time", type=float, default=TIME, help="s that towers are to stand")
+    parser.add_argument(
+        "--towers", nargs="*", type=_cubes, default=TOWERS, metavar="CUBES",
+        help="how many cubes to stack; after the settings",
+    )  # fmt: skip
+    parser.add_argument("--time", type=_time, default=TIME, help="s that towers are to stand")
     words = parser.parse_args()
     chosen = dict(words.settings) or SETTINGS
     main(__doc__, lambda: of_settings(chosen, towers=words.towers, time=words.time))

@@ -321,17 +321,19 @@ class World(Readings):
     def restore(self, saved: Snapshot) -> None:
         """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
         instance("saved", saved, Snapshot)
-        differing = [
-            f"{name}: {theirs!r} instead of {mine!r}"
-            for name, theirs, mine in (
-                ("count", len(saved.state.world), self.count),
-                ("fidelity", saved.fidelity, self.fidelity),
-                ("scene", saved.scene, self.scene),
-            )
-            if theirs != mine
-        ]
-        if differing:
-            raise ValueError(f"saved must be of the same worlds; it has another {differing[0]}")
+        count = len(saved.state.world)
+        if count != self.count:
+            what = f"count: {count} instead of {self.count}"
+        elif saved.fidelity != self.fidelity:
+            ours = vars(self.fidelity)
+            fields = [f"{k}={v!r}" for k, v in vars(saved.fidelity).items() if v != ours[k]]
+            what = f"fidelity: {', '.join(fields)}"
+        elif saved.scene != self.scene:
+            what = "scene"
+        else:
+            what = ""
+        if what:
+            raise ValueError(f"saved must be of the same worlds; it has another {what}")
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
         self._rows_valid = False
