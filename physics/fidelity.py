@@ -31,7 +31,7 @@ class Fidelity:
         contact_resolution: omega h of a contact, in rad a substep: the stiffness follows from it as
             mass (contact_resolution / substep)^2. Smaller is softer: it resolves an impact better
             and sinks deeper. At most 0.7 with springs: beyond, a box at rest would chatter. At most
-            2 with impulses, whose towers buckle below 1.5: 1.8 is right for them.
+            2 with impulses, whose towers buckle if it is small: 1.8 is right for them.
         spacing: of samples, as a fraction of the smallest width of the solid or of any body.
         rounding: of a box's edges, as a fraction of its smallest half width.
         skin: m at which a sample becomes a candidate, as a fraction of a body's smallest width.
