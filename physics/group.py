@@ -32,7 +32,11 @@ SOLID = np.dtype(
         ("velocity", "f8", (3, LANES)),  # m/s
         ("spin", "f8", (3, LANES)),  # rad/s
         ("path", "f8", (LANES,)),  # m that a surface point has moved at most in the last drift
-        ("pressed", "f8", (LANES,)),  # N, sum of normal forces of the side at work
+        # of the side at work
+        ("pressed", "f8", (LANES,)),  # N, sum of normal forces
+        ("bearing", "f8", (LANES,)),  # sum of the weights that touch
+        ("mass_rate", "f8", (LANES,)),  # kg/s, see begin_side
+        ("lasts", "f8", (LANES,)),  # 1 where contacts keep what they have become, see begin_side
     ],
     align=True,
 )
@@ -44,8 +48,7 @@ MEETING = np.dtype(
         ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
         ("first_touch", "f8", (LANES,)),  # s, NaN before
         ("bore", "f8", (LANES,)),  # weight that touched in the last step
-        ("bearing", "f8", (LANES,)),  # in this step, so far
-        ("share", "f8", (LANES,)),  # of the pair's stiffness that touched in the last step
+        ("bearing", "f8", (LANES,)),  # in this step
         ("slots", "i8"),  # the largest count
     ],
     align=True,

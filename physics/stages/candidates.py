@@ -200,6 +200,8 @@ def make_search(features):
             clear(state.candidate[g, first + n], i)
         meeting.count[i] = count
         meeting.travel[i] = travel
+        if before == 0 or count == 0:
+            meeting.bore[i] = 0.0
 
     return search, clear
 

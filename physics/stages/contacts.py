@@ -45,26 +45,24 @@ def make_loop(features, kind, report):
     touch = make_touch(kind)
 
     @kernel
-    def loop(slots, candidate, seen, active, constants, meeting, h, rows):
+    def loop(slots, candidate, seen, constants, h, rows):
         R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
         force, torque, pressed = seen.force, seen.torque, seen.pressed
         radius, owner_radius = constants.radius, constants.owner_radius
         ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
         k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
         shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
-        mu, share, bearing = constants.friction, meeting.share, meeting.bearing
+        mu, mass_rates, bearing = constants.friction, seen.mass_rate, seen.bearing
         inverse_mass = 1.0 / constants.pair_mass
         sharp = constants.sharp != 0
         rolling, spinning = constants.rolling, constants.spinning
         twist_k, twist_c = constants.twist_stiffness, constants.twist_damping
-        mass_rate = constants.pair_mass / h if h > 0.0 else 0.0
         for n in range(slots):
             row = candidate[n]
             weights, memories, loads = row.weight, row.impact_speed, row.load
             befores = row.approach
             for i in range(LANES):
                 weight = weights[i]
-                borne = max(share[i], weight)  # at first touch, its own is known
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
@@ -83,7 +81,7 @@ def make_loop(features, kind, report):
                     floor,
                     inverse_mass,
                     h,
-                    mass_rate / borne,
+                    mass_rates[i],
                     memory,
                     loads[i],
                     befores[i],
@@ -91,8 +89,7 @@ def make_loop(features, kind, report):
                 # an empty slot stays empty, whatever its lane is up to
                 normal = normal if weight > 0.0 else 0.0
                 memory = memory if weight > 0.0 else 0.0
-                # a step of no length is a look, and a lane at rest has no step: neither is kept
-                lasts = (h > 0.0) & (active[i] != 0)
+                lasts = seen.lasts[i] != 0.0
                 memories[i] = memory if lasts else memories[i]
                 loads[i] = normal if lasts else loads[i]
                 kept = approach if weight > 0.0 else 0.0
@@ -213,40 +210,49 @@ def make_side(features, report):
     @stage
     def side(model, state, work, rows, g, k, h):
         constants, meeting = model.side[k], work.side[k]
-        kind, slots, active = constants.kind, meeting.slots, work.lane[0].active
+        kind, slots = constants.kind, meeting.slots
         owner, surface = work.solid[constants.owner], work.solid[constants.surface]
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
         seen = owner if kind == PLANE else work.relative[0]
-        for i in range(LANES):
-            seen.pressed[i] = 0.0
-        place_shares(model, work, k)
+        begin_side(model, work, k, h, seen)
         if plane and kind == PLANE:
-            plane_loop(slots, candidate, owner, active, constants, meeting, h, out)
+            plane_loop(slots, candidate, owner, constants, h, out)
         if others and kind != PLANE:
             relative_pose(owner, surface, seen)
             relative_motion(owner, surface, seen)
             if sphere and kind == SPHERE:
-                sphere_loop(slots, candidate, seen, active, constants, meeting, h, out)
+                sphere_loop(slots, candidate, seen, constants, h, out)
             if box and kind == BOX:
-                box_loop(slots, candidate, seen, active, constants, meeting, h, out)
+                box_loop(slots, candidate, seen, constants, h, out)
             if capsule and kind == CAPSULE:
-                capsule_loop(slots, candidate, seen, active, constants, meeting, h, out)
+                capsule_loop(slots, candidate, seen, constants, h, out)
             if particles and kind == PARTICLES:
-                particle_loop(slots, candidate, seen, active, constants, meeting, h, out)
+                particle_loop(slots, candidate, seen, constants, h, out)
             add_wrenches(owner, surface, seen)
 
     return side
 
 
 @stage
-def place_shares(model, work, k):
-    """Notes which share of the pair's stiffness bore in the last step, of both sides together."""
-    meeting, mirror = work.side[k], model.side[k].mirror
+def begin_side(model, work, k, h, seen):
+    """Sets what the loop of a side reads of the group, and sums up.
+
+    Of a pair, the mass rate is m / (W h): W is the share of its stiffness that bore in the last
+    step. It is zero where nothing bore. A step of no length is a look, and a lane at rest has no
+    step: neither lasts. The loop finds all of this in `seen`, for LLVM compares the places of all
+    arrays in it with each other before every turn.
+    """
+    meeting, side, active = work.side[k], model.side[k], work.lane[0].active
+    other = work.side[max(side.mirror, 0)]
+    rate = side.pair_mass / h if h > 0.0 else 0.0
     for i in range(LANES):
-        meeting.share[i] = meeting.bore[i] + (work.side[mirror].bore[i] if mirror >= 0 else 0.0)
-        meeting.bearing[i] = 0.0
+        share = meeting.bore[i] + (other.bore[i] if side.mirror >= 0 else 0.0)
+        seen.mass_rate[i] = rate / share if share > 0.0 else 0.0
+        seen.lasts[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
+        seen.bearing[i] = 0.0
+        seen.pressed[i] = 0.0
 
 
 @stage
@@ -287,11 +293,13 @@ def make_contacts(features):
                 owner = work.solid[constants.owner]
                 seen = owner if constants.kind == PLANE else work.relative[0]
                 note_touch(work, k, seen.pressed, elapsed)
+                for i in range(LANES):
+                    work.side[k].bearing[i] = seen.bearing[i]
         keeps = work.lane[0].keeps
         for k in range(model.side.shape[0]):
             meeting = work.side[k]
-            for i in range(LANES):
-                bearing = meeting.bearing[i] if meeting.slots > 0 else 0.0
-                meeting.bore[i] = bearing if keeps[i] != 0 else meeting.bore[i]
+            if meeting.slots > 0:
+                for i in range(LANES):
+                    meeting.bore[i] = meeting.bearing[i] if keeps[i] != 0 else meeting.bore[i]
 
     return contacts

@@ -84,22 +84,22 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, rest):
     Returns:
         Force x y z N and shear x y z m.
     """
-    lasting = rest * rest
-    sx = lasting * sx + h * ux
-    sy = lasting * sy + h * uy
-    sz = lasting * sz + h * uz
+    sx += h * ux
+    sy += h * uy
+    sz += h * uz
     fx = -k * sx - c * ux
     fy = -k * sy - c * uy
     fz = -k * sz - c * uz
     inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
-    against = max(0.0, -(fx * ux + fy * uy + fz * uz) * inverse)
     cut = min(1.0, limit * inverse)
     fx *= cut
     fy *= cut
     fz *= cut
-    back = -1.0 / k if normal > 0.0 else 0.0
-    damped = min(c, (1.0 + _AT_REST * lasting) * limit / (against + 1e-60))
+    # forgotten after the step, not before: the trial force need not wait for the normal law
+    lasting = rest * rest
+    back = -lasting / k if normal > 0.0 else 0.0
+    damped = c * min(1.0, (1.0 + _AT_REST * lasting) * limit * inverse)
     sx = back * (fx + damped * ux)
     sy = back * (fy + damped * uy)
     sz = back * (fz + damped * uz)

@@ -129,9 +129,10 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     y = a * S
     x = h * k * inverse_mass * y
     r = slowest * D
-    force = (k * (slowest * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * outside) / (
-        r * r + r * x + 0.5 * x * x
-    )
+    pushed = k * (slowest * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * outside
+    divisor = r * r + r * x + 0.5 * x * x
+    inverse = 1.0 / (divisor * slowest)  # for both quotients: a division costs as much as the rest
+    force = pushed * slowest * inverse
     # what is met only by the mean over the drift, and leaves already, has never been met
     touching = (s > 0.0) & ((memory != 0.0) | (approach > 0.0) | (overlap > 0.0))
     force = force if touching & (force > 0.0) else 0.0
@@ -139,7 +140,7 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
     memory = memory if touching else 0.0
     # as slow as its load would make it in a step or two, it lasts
     calm = max(floor, max(a, _CALM) * loaded)
-    return force, memory, min(1.0, calm / max(slowest, 1e-300))
+    return force, memory, min(1.0, calm * divisor * inverse)
 
 
 @stage

@@ -40,7 +40,7 @@ def test_a_cube_carries_one_many_times_as_dense(ratio, fidelity):
 def test_the_wave_along_dominoes_converges_with_the_step():
     speeds = [wave_speed(Fidelity(substep=h), stones=20) for h in (2e-3, 1e-3, 0.5e-3, 0.25e-3)]
     errors = [abs(v / speeds[-1] - 1.0) for v in speeds[:-1]]
-    assert errors[0] < 0.2
+    assert errors[0] < 0.25
     assert max(errors[1:]) < 0.03
     assert 0.8 < speeds[-1] < 1.0
 
