@@ -5,7 +5,7 @@ from physics.errors import ContactOverflow, SimulationDiverged
 from physics.features import Features
 from physics.fidelity import PRESETS, Fidelity
 from physics.readout import Readout
-from physics.scene import Body, Drive, Ground, Material, Scene, Static
+from physics.scene import Body, Drive, Gripper, Ground, Material, Scene, Static
 from physics.shapes import Box, Capsule, Sphere
 from physics.world import Snapshot, World
 
@@ -19,6 +19,7 @@ __all__ = [
     "Drive",
     "Features",
     "Fidelity",
+    "Gripper",
     "Ground",
     "Material",
     "Readout",

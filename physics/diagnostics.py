@@ -181,6 +181,21 @@ def first_touch(model: Model, state: State, first: int, second: int) -> Array:
     return np.fmin.reduce(touches, axis=1, initial=np.nan)
 
 
+def first_touch_position(model: Model, state: State, first: int, second: int) -> Array:
+    """Where the first of two solids was then, [w, 3] m, NaN before."""
+    sides = np.flatnonzero(between(model, first, second))
+    touches = state.side["first_touch"][:, sides]
+    found = ~np.isnan(touches).all(axis=1)
+    earliest = sides[np.argmin(np.where(np.isnan(touches), np.inf, touches), axis=1)]
+    places = state.side["first_position"][np.arange(len(found)), earliest]
+    return np.where(found[:, None], places, np.nan)
+
+
+def pressing(model: Model, state: State, first: int, second: int) -> Array:
+    """Sum of the normal forces between two solids in the last step, [w] N."""
+    return state.side["pressed"][:, between(model, first, second)].sum(axis=1)
+
+
 def between(model: Model, first: int, second: int) -> Array:
     """Which sides lie between two solids, [k] bools."""
     ends = np.sort(np.stack([model.side["owner"], model.side["surface"]], axis=-1))

@@ -21,6 +21,7 @@ class Features(NamedTuple):
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         drives: there are driven tools.
+        gripper: some of them are the fingers of grippers.
     """
 
     impulse: bool
@@ -35,3 +36,4 @@ class Features(NamedTuple):
     capsule: bool
     particles: bool
     drives: bool
+    gripper: bool

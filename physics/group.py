@@ -47,6 +47,8 @@ MEETING = np.dtype(
         ("count", "i8", (LANES,)),  # candidates
         ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
         ("first_touch", "f8", (LANES,)),  # s, NaN before
+        ("first_position", "f8", (3, LANES)),  # m, where the pair's first solid was then
+        ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
         ("bore", "f8", (LANES,)),  # weight that touched in the last step
         ("bearing", "f8", (LANES,)),  # in this step
         ("slots", "i8"),  # the largest count
@@ -234,24 +236,52 @@ def load(model, state, work, chosen, g):
                 side.count[i] = found.count
                 side.travel[i] = found.travel
                 side.first_touch[i] = found.first_touch
+                side.pressed[i] = found.pressed
                 side.bore[i] = found.bore
+                for c in range(3):
+                    side.first_position[c, i] = found.first_position[c]
             else:
                 side.count[i] = 0
                 side.travel[i] = 1e300
                 side.first_touch[i] = 0.0
+                side.pressed[i] = 0.0
                 side.bore[i] = 0.0
     for k in range(model.side.shape[0]):
         count_slots(work, k)
 
 
 @stage
-def note_touch(work, k, pressed, elapsed):
-    """Notes in which lanes a side touches for the first time; `pressed` [N or N s] tells if."""
-    first, start, keeps = work.side[k].first_touch, work.lane[0].start, work.lane[0].keeps
+def clear_pressed(model, work):
+    """Before the contacts of a step: nothing presses."""
+    keeps = work.lane[0].keeps
+    for k in range(model.side.shape[0]):
+        pressed = work.side[k].pressed
+        for i in range(LANES):
+            pressed[i] = 0.0 if keeps[i] != 0 else pressed[i]
+
+
+@stage
+def note_touch(model, work, k, pressed, elapsed):
+    """Notes how hard a side presses, `pressed` [N], and when and where it does so first."""
+    side, solids = work.side[k], model.side[k]
+    position = work.solid[min(solids.owner, solids.surface)].position
+    first, where, start = side.first_touch, side.first_position, work.lane[0].start
+    keeps, noted = work.lane[0].keeps, side.pressed
+    new = 0
     for i in range(LANES):
-        time = start[i] + elapsed
-        before = (pressed[i] <= 0.0) | (first[i] <= time) | (keeps[i] == 0)
-        first[i] = first[i] if before else time
+        noted[i] = pressed[i] if keeps[i] != 0 else noted[i]
+        before = (pressed[i] <= 0.0) | (first[i] <= start[i] + elapsed) | (keeps[i] == 0)
+        new += 0 if before else 1
+    if new > 0:
+        for i in range(LANES):
+            time = start[i] + elapsed
+            if not ((pressed[i] <= 0.0) | (first[i] <= time) | (keeps[i] == 0)):
+                first[i] = time
+                where[0, i], where[1, i], where[2, i] = (
+                    position[0, i],
+                    position[1, i],
+                    position[2, i],
+                )
 
 
 @stage
@@ -286,4 +316,7 @@ def store(model, state, work, g, i, time):
         found.count = side.count[i]
         found.travel = side.travel[i]
         found.first_touch = side.first_touch[i]
+        found.pressed = side.pressed[i]
+        for c in range(3):
+            found.first_position[c] = side.first_position[c, i]
         found.bore = side.bore[i]

@@ -50,11 +50,11 @@ def _check_sink(scene: Scene, fidelity: Fidelity, model: Model) -> None:
 
 def _check_servos(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     h, bodies = fidelity.substep, len(scene.bodies)
-    for i, drive in enumerate(scene.drives):
+    for i, drive in enumerate(scene.tools):
         longest = stability.of_servo(model.mover[bodies + i])
         if h >= longest:
             raise ValueError(
-                f"Drive.frequency {drive.frequency:g} rad/s of drive {i} makes the substep of "
+                f"Drive.frequency {drive.frequency:g} rad/s of tool {i} makes the substep of "
                 f"{h:g} s unstable: the largest safe step is {_below(longest)} s; lower the "
                 "frequency, shorten Fidelity.substep, or build the World with allow_unstable=True"
             )
@@ -92,7 +92,7 @@ def cause_of_divergence(
 
 def _given_stiffness(scene: Scene) -> list[float]:
     """Stiffness in N/m of the materials that name one."""
-    solids = (*scene.bodies, *scene.statics, *scene.drives)
+    solids = (*scene.bodies, *scene.statics, *scene.tools)
     return [x.material.stiffness for x in solids if x.material.stiffness is not None]
 
 
@@ -102,4 +102,4 @@ def _safe_step(
     """A step in s that is safe in any state, and the name of the mover that binds it."""
     step, i = stability.of_scene(scene, model, features, fidelity.spacing)
     bodies = len(scene.bodies)
-    return step, f"body {i}" if i < bodies else f"drive {i - bodies}"
+    return step, f"body {i}" if i < bodies else f"tool {i - bodies}"

@@ -40,6 +40,8 @@ MOVER = np.dtype(
         ("servo_stiffness", "f8"),  # N/m
         ("servo_damping", "f8"),  # N s/m
         ("force_limit", "f8"),  # N along each axis
+        ("twin", "i8"),  # the other finger of a gripper, or -1
+        ("grip_limit", "f8"),  # N between the two
     ],
     align=True,
 )
@@ -143,8 +145,8 @@ def _spacing(solid: Solid, scene: Scene, fidelity: Fidelity) -> float:
 
 def _sides(scene: Scene, fidelity: Fidelity) -> Iterator[Side]:
     """All sides through which the scene's solids can meet, in a fixed order."""
-    solids: list[Solid] = [*scene.bodies, *scene.drives, *scene.statics]
-    movers = len(scene.bodies) + len(scene.drives)
+    solids: list[Solid] = [*scene.bodies, *scene.tools, *scene.statics]
+    movers = len(scene.bodies) + len(scene.tools)
 
     def rounding(solid: Body | Drive | Static) -> float:
         return fidelity.rounding * solid.shape.width / 2.0
@@ -177,9 +179,12 @@ def _sides(scene: Scene, fidelity: Fidelity) -> Iterator[Side]:
             elif isinstance(b.shape, Sphere):
                 yield backward
             else:
-                halves = [s._replace(weights=0.5 * s.weights) for s in (samples(a), samples(b))]
-                yield forward._replace(samples=halves[0])
-                yield backward._replace(samples=halves[1])
+                # of a wide face few samples lie where a narrow one touches it, so the narrow one's
+                # bear the more: half and half of equal ones
+                area, other = a.shape.width**2, b.shape.width**2
+                for side, share in ((forward, other), (backward, area)):
+                    weights = share / (area + other) * side.samples.weights
+                    yield side._replace(samples=side.samples._replace(weights=weights))
 
 
 def _capacity(side: Side) -> int:
@@ -223,17 +228,30 @@ def _mover_row(solid: Solid, gravity: Array) -> tuple[object, ...]:
     if isinstance(solid, Body):
         inertia = solid.shape.inertia(solid.mass)
         weight = solid.mass * gravity + 0.0  # without a negative zero, which sums would lose
-        return 1, reach, 1.0 / solid.mass, inertia, 1.0 / inertia, weight, 0.0, 0.0, 0.0
+        servo = 0.0, 0.0, 0.0, -1, 0.0
+        return 1, reach, 1.0 / solid.mass, inertia, 1.0 / inertia, weight, *servo
     stiffness = solid.mass * solid.frequency**2
     damping = 2.0 * solid.damping_ratio * solid.mass * solid.frequency
     endless, zero = np.full(3, np.inf), np.zeros(3)
     limit = solid.force_limit
-    return 0, reach, 1.0 / solid.mass, endless, zero, zero, stiffness, damping, limit
+    servo = stiffness, damping, limit, -1, 0.0
+    return 0, reach, 1.0 / solid.mass, endless, zero, zero, *servo
+
+
+def _mover_rows(scene: Scene, gravity: Array) -> Array:
+    """All rows of MOVER."""
+    movers: list[Solid] = [*scene.bodies, *scene.tools]
+    rows = np.array([_mover_row(m, gravity) for m in movers], dtype=MOVER)
+    for index, gripper in scene.grippers:
+        first = len(scene.bodies) + index
+        rows["twin"][first : first + 2] = first + 1, first
+        rows["grip_limit"][first : first + 2] = gripper.grip_limit
+    return rows
 
 
 def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
     """The arrays and the features of a scene at a fidelity."""
-    solids: list[Solid] = [*scene.bodies, *scene.drives, *scene.statics]
+    solids: list[Solid] = [*scene.bodies, *scene.tools, *scene.statics]
     gravity = np.array(scene.gravity)
     g = float(np.sqrt(np.sum(gravity**2)))
     omega = fidelity.contact_resolution / fidelity.substep
@@ -299,10 +317,7 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         for s in scene.statics
     ]
     model = Model(
-        mover=np.array(
-            [_mover_row(m, gravity) for m in solids[: len(scene.bodies) + len(scene.drives)]],
-            dtype=MOVER,
-        ),
+        mover=_mover_rows(scene, gravity),
         side=side,
         static=np.array(poses, dtype=float).reshape(-1, 7),
         sample=np.concatenate(samples),
@@ -341,4 +356,5 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
         capsule=CAPSULE in kinds,
         particles=PARTICLES in kinds,
         drives=bool(scene.drives),
+        gripper=bool(scene.grippers),
     )

@@ -7,7 +7,7 @@ from physics.group import end_look
 from physics.jit import stage
 from physics.stages.candidates import make_candidates
 from physics.stages.contacts import make_contacts
-from physics.stages.drives import make_drives
+from physics.stages.drives import make_drives, make_join
 from physics.stages.gravity import gravity
 from physics.stages.impulses import make_impulses
 from physics.stages.integrator import make_drift, make_kick
@@ -21,6 +21,7 @@ def make_forces(features: Features):
     Velocities are those of the last drift, of `drifted` s, and so half of it old.
     """
     drives = make_drives(features)
+    join = make_join(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
     @stage
@@ -28,6 +29,7 @@ def make_forces(features: Features):
         gravity(model, work)
         drives(model, work, drifted)
         contacts(model, state, work, g, h, drifted, elapsed)
+        join(model, work, drifted)
 
     return forces
 

@@ -85,14 +85,19 @@ class Readings:
 
     @property
     def drive_position(self) -> Array:
-        """[count, drives, 3] m: a read-only view that follows the state."""
+        """[count, tools, 3] m: a read-only view that follows the state."""
         return self._read(self._state.mover["position"][:, self._bodies :])
 
     @property
     def drive_velocity(self) -> Array:
-        """[count, drives, 3] m/s, world frame."""
+        """[count, tools, 3] m/s, world frame."""
         inverse = self._model.mover["inverse_mass"][self._bodies :]
         return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
+
+    @property
+    def drive_reference(self) -> Array:
+        """[count, tools, 3] m, where the servos pull to: a read-only view of the state."""
+        return self._read(self._state.mover["reference"][:, self._bodies :])
 
     def read(self) -> Readout:
         """A copy of all poses and velocities, drives after the bodies, in one pass."""
@@ -142,15 +147,43 @@ class Readings:
         """[count] s, when two solids first touched since their state was set; NaN before.
 
         Args:
-            first: index of a solid: bodies, then drives, then statics, each in scene order.
+            first: index of a solid: bodies, then tools, then statics, each in scene order.
             second: another.
         """
+        ends = self._pair(first, second)
+        self._settle()
+        return diagnostics.first_touch(self._model, self._state, *ends)
+
+    def first_touch_position(self, first: int, second: int) -> Array:
+        """[count, 3] m, where the centre of one of two solids was at their first touch; NaN before.
+
+        Args:
+            first: index of the solid whose position is told, as in `first_touch`.
+            second: another, that comes after it.
+        """
+        ends = self._pair(first, second)
+        if ends[0] > ends[1]:
+            raise ValueError(
+                f"first must come before second, whose position isn't kept: got {ends[0]} and "
+                f"{ends[1]}"
+            )
+        self._settle()
+        return diagnostics.first_touch_position(self._model, self._state, *ends)
+
+    def pressing(self, first: int, second: int) -> Array:
+        """[count] N, the sum of the normal forces between two solids, as in `first_touch`."""
+        ends = self._pair(first, second)
+        self._settle()
+        return diagnostics.pressing(self._model, self._state, *ends)
+
+    def _pair(self, first: int, second: int) -> tuple[int, int]:
+        """Two solids that can meet."""
         ends = integer("first", first, low=0), integer("second", second, low=0)
-        last = self._bodies + len(self.scene.drives) + len(self.scene.statics) - 1
+        last = self._bodies + len(self.scene.tools) + len(self.scene.statics) - 1
         for name, value in zip(("first", "second"), ends, strict=True):
             if value > last:
                 raise ValueError(
-                    f"{name} must be the index of a solid, 0 to {last} (bodies, then drives, then "
+                    f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
                     f"statics), got {value}"
                 )
         if not diagnostics.between(self._model, *ends).any():
@@ -158,8 +191,7 @@ class Readings:
                 f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
                 "one solid, or two statics, never do"
             )
-        self._settle()
-        return diagnostics.first_touch(self._model, self._state, *ends)
+        return ends
 
     def largest_stable_step(self, world: int = 0) -> float:
         """Largest stable step in s with the contacts that a world has now; inf without any."""

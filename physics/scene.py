@@ -182,19 +182,86 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Gripper:
+    """A parallel gripper: two equal fingers on one carriage, closing along y, that never turn.
+
+    One mechanism that moves in four ways: its carriage along x, y and z, and the distance of the
+    fingers. Carriage and grip have servos with limits of their own, so that a full grip leaves the
+    carriage all of its force. Two fingers with a limit each could press an object away sideways,
+    once both are at it. Along x and z the fingers are one solid.
+
+    In a World it counts as two tools, its fingers, the one at smaller y first.
+
+    Args:
+        shape: of a finger, any shape with an exact surface.
+        mass: kg of a finger with its half of the carriage, above zero.
+        force_limit: N of the carriage along each axis, above zero.
+        grip_limit: N with which each finger presses at most, above zero.
+        position: in the middle of the fingers' centres at the start, m.
+        distance: of the fingers' centres at the start, m, above zero.
+        orientation: of both fingers, quaternion x, y, z, w, fixed for good; it is normalised.
+        frequency: rad/s, natural frequency of both servos.
+        damping_ratio: of both servos; 1 is critical.
+        material: the fingers' surface.
+    """
+
+    shape: Shape
+    mass: float
+    force_limit: float
+    grip_limit: float
+    position: Vector = ZERO
+    distance: float = 0.1
+    orientation: Vector = NO_TURN
+    frequency: float = 60.0
+    damping_ratio: float = 1.0
+    material: Material = field(default_factory=Material)
+
+    def __post_init__(self) -> None:
+        """Checks every field."""
+        instance("Gripper.shape", self.shape, Shape)
+        instance("Gripper.material", self.material, Material)
+        for name in ("mass", "force_limit", "grip_limit", "distance", "frequency"):
+            object.__setattr__(self, name, positive(f"Gripper.{name}", getattr(self, name)))
+        ratio = number("Gripper.damping_ratio", self.damping_ratio, low=0.0)
+        object.__setattr__(self, "damping_ratio", ratio)
+        object.__setattr__(self, "position", vector("Gripper.position", self.position))
+        turn = unit_quaternion("Gripper.orientation", self.orientation)
+        object.__setattr__(self, "orientation", turn)
+
+    @property
+    def fingers(self) -> tuple[Drive, Drive]:
+        """Both fingers; each has half of the carriage's force."""
+        x, y, z = self.position
+        first, second = (
+            Drive(
+                self.shape,
+                self.mass,
+                0.5 * self.force_limit,
+                (x, y + side * 0.5 * self.distance, z),
+                self.orientation,
+                self.frequency,
+                self.damping_ratio,
+                self.material,
+            )
+            for side in (-1.0, 1.0)
+        )
+        return first, second
+
+
+@dataclass(frozen=True)
 class Scene:
     """Bodies, static solids and driven tools under gravity.
 
     Args:
         bodies: free bodies; at least one body or drive is needed.
         statics: Ground or Static.
-        drives: driven tools.
+        drives: driven tools: Drive or Gripper.
         gravity: m/s^2.
     """
 
     bodies: Sequence[Body] = ()
     statics: Sequence[Ground | Static] = ()
-    drives: Sequence[Drive] = ()
+    drives: Sequence[Drive | Gripper] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
 
     def __post_init__(self) -> None:
@@ -202,7 +269,7 @@ class Scene:
         kinds: dict[str, tuple[type, ...]] = {
             "bodies": (Body,),
             "statics": (Ground, Static),
-            "drives": (Drive,),
+            "drives": (Drive, Gripper),
         }
         for name, types in kinds.items():
             value = getattr(self, name)
@@ -214,3 +281,21 @@ class Scene:
         if not self.bodies and not self.drives:
             raise ValueError("Scene.bodies must hold at least one Body (or Scene.drives a Drive)")
         object.__setattr__(self, "gravity", vector("Scene.gravity", self.gravity))
+
+    @property
+    def tools(self) -> tuple[Drive, ...]:
+        """All driven solids in the order of a World: of a Gripper, both fingers."""
+        tools: list[Drive] = []
+        for drive in self.drives:
+            tools += drive.fingers if isinstance(drive, Gripper) else [drive]
+        return tuple(tools)
+
+    @property
+    def grippers(self) -> tuple[tuple[int, Gripper], ...]:
+        """Every Gripper, and the index of its first finger among the tools."""
+        found, first = [], 0
+        for drive in self.drives:
+            if isinstance(drive, Gripper):
+                found.append((first, drive))
+            first += 2 if isinstance(drive, Gripper) else 1
+        return tuple(found)

@@ -120,7 +120,7 @@ def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> 
 
     A bound: each mover lies flat on its six stiffest partners at once.
     """
-    movers: list[Body | Drive] = [*scene.bodies, *scene.drives]
+    movers: list[Body | Drive] = [*scene.bodies, *scene.tools]
     if not movers:
         return math.inf, 0
     steps = [

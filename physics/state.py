@@ -32,6 +32,8 @@ FOUND = np.dtype(
         ("count", "i8"),  # candidates
         ("travel", "f8"),  # m that both solids may still move before candidates are missing
         ("first_touch", "f8"),  # s, NaN before
+        ("first_position", "f8", (3,)),  # m, where the pair's first solid was then
+        ("pressed", "f8"),  # N, sum of the normal forces of the last step
         ("bore", "f8"),  # weight of the samples that touched in the last step, of springs
     ],
     align=True,

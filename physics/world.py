@@ -86,7 +86,7 @@ class World(Readings):
     def _initial_rows(self) -> Array:
         """The scene's state as rows [movers] of MOVING."""
         bodies = self.scene.bodies
-        movers: list[Body | Drive] = [*bodies, *self.scene.drives]
+        movers: list[Body | Drive] = [*bodies, *self.scene.tools]
         rows = np.zeros(len(movers), dtype=MOVING)
         rows["position"] = rows["reference"] = [m.position for m in movers]
         rows["orientation"] = [m.orientation for m in movers]
@@ -116,6 +116,7 @@ class World(Readings):
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
         state.side["first_touch"][worlds] = np.nan
+        state.side["pressed"][worlds] = 0.0
         state.world["overflow"][worlds] = 0
 
     # --- time ---------------------------------------------------------------------------------
@@ -225,18 +226,18 @@ class World(Readings):
             orientation: [chosen, bodies, 4] quaternions x y z w; they are normalised.
             linear_velocity: m/s, [chosen, bodies, 3].
             angular_velocity: rad/s, world frame, [chosen, bodies, 3].
-            drive_position: m, [chosen, drives, 3].
-            drive_velocity: m/s, [chosen, drives, 3].
+            drive_position: m, [chosen, tools, 3].
+            drive_velocity: m/s, [chosen, tools, 3].
             time: [chosen] s.
             worlds: mask [count] of the chosen worlds; all if None.
 
         Raises:
-            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero. The
-                state is then as it was.
+            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero,
+                fingers of a gripper apart in x or z. The state is then as it was.
         """
         mask = self._mask(worlds)
         chosen, bodies = int(mask.sum()), self._bodies
-        drives = len(self.scene.drives)
+        drives = len(self.scene.tools)
         sizes = {
             "position": (bodies, 3),
             "orientation": (bodies, 4),
@@ -275,6 +276,14 @@ class World(Readings):
                 "angular_velocity must be zero in a scene of frictionless balls at rest, where "
                 "rotation isn't simulated; give a body its spin in the Scene"
             )
+        for name in ("drive_position", "drive_velocity"):
+            for first, _ in self.scene.grippers if name in new else ():
+                one, other = new[name][:, first, ::2], new[name][:, first + 1, ::2]
+                if np.any(one != other):
+                    raise ValueError(
+                        f"{name} must have the same x and z for both fingers of a gripper, tools "
+                        f"{first} and {first + 1}, which are one solid along these axes"
+                    )
         state = self._state
         # what isn't given stays: the spin, not its momentum, where only the orientation changes
         spin = new.get("angular_velocity")
@@ -304,15 +313,29 @@ class World(Readings):
         self._forget(mask)
 
     def command_drives(self, velocity: Any) -> None:
-        """Lets every drive's reference move from where the drive is now, at a velocity.
+        """Lets every tool's reference move from where the tool is now, at a velocity.
 
         Args:
-            velocity: [count, drives, 3] m/s, or what broadcasts to it; it holds until changed.
+            velocity: [count, tools, 3] m/s, or what broadcasts to it; it holds until changed.
         """
-        shape = (self.count, len(self.scene.drives), 3)
+        shape = (self.count, len(self.scene.tools), 3)
         mover, drives = self._state.mover, slice(self._bodies, None)
         mover["reference_velocity"][:, drives] = array("velocity", velocity, shape)
         mover["reference"][:, drives] = mover["position"][:, drives]
+
+    def move_drives(self, target: Any, time: float) -> None:
+        """Lets every tool's reference move from where the reference is now to a target.
+
+        A tool that holds a load hangs behind its reference. From the reference on, it stays so.
+
+        Args:
+            target: [count, tools, 3] m, or what broadcasts to it.
+            time: s in which it is reached, and after which a new command is due.
+        """
+        shape = (self.count, len(self.scene.tools), 3)
+        mover, drives = self._state.mover, slice(self._bodies, None)
+        way = array("target", target, shape) - mover["reference"][:, drives]
+        mover["reference_velocity"][:, drives] = way / positive("time", time)
 
     def snapshot(self) -> Snapshot:
         """Everything the worlds hold; `restore` continues from it to the last bit."""

@@ -28,6 +28,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         show_forces: draw contact forces.
         max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
         terminate_on_success: end an episode when it is solved.
+        **arguments: of the task, as `blocks`.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 25}
@@ -41,6 +42,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         show_forces: bool = False,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
+        **arguments: Any,
     ) -> None:
         """Builds the world; an episode begins with `reset`."""
         if render_mode is not None:
@@ -48,7 +50,14 @@ class RigidEnv(gym.Env[Observation, Array]):
         self.render_mode = render_mode
         self._show_forces: bool = instance("show_forces", show_forces, bool)
         self._runner = Runner(
-            task, 1, reward_type, fidelity, 1, max_episode_steps, terminate_on_success
+            task,
+            1,
+            reward_type,
+            fidelity,
+            1,
+            max_episode_steps,
+            terminate_on_success,
+            **arguments,
         )
         self._renderer: Renderer | None = None
         self.observation_space: Any = self._runner.observation_space

@@ -1,4 +1,8 @@
-"""Distance of goals, and what of a row lies within its bounds: one pass over all worlds."""
+"""Distance of goals, and what of a row lies within its bounds: one pass over all worlds.
+
+A goal is a row of points of three components each; what is left over at its end is a point of
+fewer. Two goals are as far apart as their points that are farthest apart.
+"""
 
 import math
 from functools import cache
@@ -13,12 +17,16 @@ Array = np.ndarray
 
 @kernel
 def _apart(a, b, first, n, i):
-    """Distance of a[i, first : first + n] and b[i, :n]."""
-    total = 0.0
-    for c in range(n):
-        d = np.float64(a[i, first + c]) - np.float64(b[i, c])
-        total += d * d
-    return math.sqrt(total)
+    """Distance of the goals a[i, first : first + n] and b[i, :n]."""
+    largest = 0.0
+    for point in range(0, n, 3):
+        square = 0.0
+        for c in range(point, min(point + 3, n)):
+            d = np.float64(a[i, first + c]) - np.float64(b[i, c])
+            square += d * d
+        if square > largest or square != square:  # NaN stays NaN
+            largest = square
+    return math.sqrt(largest)
 
 
 @cache
@@ -59,7 +67,7 @@ def _make_judge() -> Any:
 
 
 def distance(a: Any, b: Any) -> Any:
-    """Euclidean distance over the last axis, [...] m; the other axes broadcast."""
+    """Distance [...] m of goals [..., n], of points if n is 3; the leading axes broadcast."""
     a, b = np.asarray(a), np.asarray(b)
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)

@@ -2,7 +2,12 @@
 
 import gymnasium as gym
 
-ENVIRONMENTS = {"RigidEnvs/Push-v0": ("push", 50)}
+# id: task, and steps of an episode
+ENVIRONMENTS = {
+    "RigidEnvs/Push-v0": ("push", 50),
+    "RigidEnvs/Stack-v0": ("stack", 100),
+    "RigidEnvs/Throw-v0": ("throw", 50),
+}
 
 
 def register() -> None:

@@ -11,6 +11,8 @@ from rigid_envs.goals import distance
 Array = np.ndarray
 
 REWARD_TYPES = ("sparse", "dense")
+# terms that follow from the goals
+OF_GOALS = ("success", "distance")
 
 
 @dataclass(frozen=True)
@@ -18,16 +20,15 @@ class Reward:
     """Sparse and dense reward of a goal-conditioned task.
 
     Sparse: 0 where the goals are within the threshold, else -1.
-    Dense: -distance/scale, plus 1 where solved, plus the sum of weight times raw term.
+    Dense: the sum of weight times raw term. Two terms follow from the goals: "success", 1 where
+    solved, and "distance", m apart with a minus; the others are the task's.
 
     Args:
         threshold: m, largest distance that counts as solved.
-        scale: m of distance that costs 1 a step.
         weights: of the raw terms, by name.
     """
 
     threshold: float
-    scale: float
     weights: Mapping[str, float]
 
     def success(self, apart: Any) -> Any:
@@ -40,9 +41,10 @@ class Reward:
 
     def dense(self, success: Any, apart: Any, terms: Mapping[str, Array]) -> Any:
         """The shaped reward, [...]."""
-        reward = success - apart / self.scale
+        known = {"success": success, "distance": -apart}
+        reward = np.zeros_like(apart)
         for name, weight in self.weights.items():
-            reward += weight * terms[name]
+            reward = reward + weight * (known[name] if name in known else terms[name])
         return reward
 
     def compute(self, kind: str, achieved: Array, desired: Array, info: Any) -> Any:
@@ -73,12 +75,13 @@ class Reward:
         return float(reward) if achieved.ndim == 1 else reward
 
     def _terms(self, info: Any) -> dict[str, Array]:
+        names = [name for name in self.weights if name not in OF_GOALS]
         try:
             if isinstance(info, Mapping):
-                return {name: np.asarray(info[name]) for name in self.weights}
-            return {name: np.array([one[name] for one in info]) for name in self.weights}
+                return {name: np.asarray(info[name]) for name in names}
+            return {name: np.array([one[name] for one in info]) for name in names}
         except (KeyError, TypeError):
             raise ValueError(
-                f"the dense reward needs the terms {list(self.weights)} of the step's info, got "
+                f"the dense reward needs the terms {names} of the step's info, got "
                 f'{info!r}; relabelled goals (HER) need reward_type="sparse"'
             ) from None

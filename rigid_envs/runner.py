@@ -1,5 +1,6 @@
 """The runner: a task on a world of any count. Both kinds of environment are thin adapters to it."""
 
+import inspect
 import math
 from typing import Any, NamedTuple
 
@@ -49,6 +50,7 @@ class Runner:
         threads: to share the worlds out over; all cores if None.
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
+        **arguments: of the task, where it is given by its name.
     """
 
     def __init__(
@@ -60,9 +62,10 @@ class Runner:
         threads: int | None = None,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
+        **arguments: Any,
     ) -> None:
         """Builds the world; episodes begin with `reset`."""
-        self.task = task if isinstance(task, Task) else TASKS[choice("task", task, TASKS)]()
+        self.task = _make_task(task, arguments)
         self.reward_type = choice("reward_type", reward_type, REWARD_TYPES)
         self.world = World(self.task.scene(), fidelity, count, threads)
         self.count = count
@@ -125,8 +128,8 @@ class Runner:
         """Observation, and what is told beside it: info, [count] each."""
         now, split = self._now, len(self.task.bounds)
         values = np.empty((self.count, len(self._low)), dtype=np.float32)
-        self.task.observe(now, values[:, :split])
-        values[:, split:] = self.task.achieved(now)
+        self.task.observe(self.world, now, values[:, :split])
+        values[:, split:] = self.task.achieved(self.world, now)
         self._apart, outside = judge(values, self._low, self._high, self._goals)
         achieved, desired = values[:, split:], self._goals.copy()
         observation = {
@@ -139,7 +142,7 @@ class Runner:
             "is_success": success,
             "success": success,
             "out_of_bounds": outside,
-            **self.task.terms(now, achieved, desired, self._apart),
+            **self.task.terms(self.world, now, achieved, desired, self._apart),
         }
         return observation, info
 
@@ -234,6 +237,20 @@ class Runner:
         self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
         self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]
         self._seeded = bool(np.all(self._episodes >= 0))
+
+
+def _make_task(task: Any, arguments: dict[str, Any]) -> Task:
+    """A task from its name and arguments, or the task itself."""
+    if isinstance(task, Task):
+        known: list[str] = []
+    else:
+        kind = TASKS[choice("task", task, TASKS)]
+        known = [p for p in inspect.signature(kind).parameters if p != "self"]
+    for name in arguments:
+        if name not in known:
+            of_task = f"task {task!r} knows {known}" if known else f"task {task!r} knows none"
+            raise TypeError(f"unknown argument {name!r}: of its own, {of_task}")
+    return task if isinstance(task, Task) else kind(**arguments)
 
 
 def check_seed(field: str, value: Any) -> int:

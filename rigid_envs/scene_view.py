@@ -25,7 +25,7 @@ def items(runner: Runner, world: int) -> list[Item]:
         )
         for i, body in enumerate(scene.bodies)
     ]
-    for i, drive in enumerate(scene.drives):
+    for i, drive in enumerate(scene.tools):
         orientation = np.array(drive.orientation)
         position = engine.drive_position[world, i]
         found.append(Item(drive.shape, position, orientation, DRIVE_COLOR))

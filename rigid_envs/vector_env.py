@@ -33,6 +33,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         terminate_on_success: end an episode when it is solved.
         autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as gymnasium.vector.AutoresetMode.
         threads: to share the worlds out over; all cores if None.
+        **arguments: of the task, as `blocks`.
     """
 
     metadata: dict[str, Any] = {
@@ -52,6 +53,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        **arguments: Any,
     ) -> None:
         """Builds the worlds; episodes begin with `reset`."""
         self.num_envs = integer("num_envs", num_envs, low=1)
@@ -68,6 +70,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             threads,
             max_episode_steps,
             terminate_on_success,
+            **arguments,
         )
         self._renderer: Renderer | None = None
         self._ended = np.zeros(self.num_envs, dtype=bool)

@@ -20,6 +20,7 @@ import math
 from functools import cache
 
 from physics.jit import LANES, kernel, stage
+from physics.stages.drives import make_join_speeds
 from physics.stages.points import cross, ends, give, slip
 
 # Rounds end when none has changed a speed by more than this share of the fastest approach, or after
@@ -186,7 +187,7 @@ def book_hits(model, work, look):
 @cache
 def make_impacts(features):
     """Kernel that lets contacts collide where they do."""
-    press = make_press(features)
+    press, join_speeds = make_press(features), make_join_speeds(features)
 
     @kernel
     def press_all(model, work, after):
@@ -203,6 +204,7 @@ def make_impacts(features):
                     a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                     mu = model.side[k].friction
                     press(points, a, b, A, B, ma, mb, mu, lane, after)
+                    join_speeds(model, work)
             going = 0
             for i in range(LANES):
                 lane.going[i] = lane.going[i] if lane.change[i] > SMALL * lane.speed[i] else 0
@@ -217,6 +219,7 @@ def make_impacts(features):
                 points, A, B, ma, mb = ends(model, work, k)
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                 rebound(points, a, b, A, B, ma, mb, work.lane[0], again)
+        join_speeds(model, work)
 
     @kernel
     def collide(model, work, look):
@@ -262,6 +265,7 @@ def make_impacts(features):
                 points, A, B, ma, mb = ends(model, work, k)
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                 retract(points, a, b, A, B, ma, mb, work.lane[0].struck)
+        join_speeds(model, work)
         if find_all(model, work, h) > 0:
             collide(model, work, look)
 

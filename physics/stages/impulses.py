@@ -25,8 +25,9 @@ cone can't turn into an ascent. Resistance against rolling and spinning is the s
 import math
 from functools import cache
 
-from physics.group import note_touch
+from physics.group import clear_pressed, note_touch
 from physics.jit import LANES, kernel, stage
+from physics.stages.drives import make_join_speeds
 from physics.stages.impacts import make_impacts
 from physics.stages.kinematics import turned_back
 from physics.stages.points import cross, ends, give, make_points, place_tensors, slip, times, turn
@@ -182,7 +183,7 @@ def make_book(features):
                 fx = point.spent[0, i] + push * point.normal[0, i]
                 fy = point.spent[1, i] + push * point.normal[1, i]
                 fz = point.spent[2, i] + push * point.normal[2, i]
-                pressed[i] += push + point.hit[i]
+                pressed[i] += per_h * (push + point.hit[i])
                 row.load[i] = per_h * push if keeps[i] != 0 else row.load[i]
                 hit = per_h * point.hit[i]
                 bx, by, bz = turned_back(
@@ -273,6 +274,7 @@ def make_impulses(features):
     """Stage that adds the contact forces of all sides, and notes first touches."""
     points, impacts = make_points(features), make_impacts(features)
     sweep, warm, book = make_sweep(features), make_warm(features), make_book(features)
+    join_speeds = make_join_speeds(features)
 
     @kernel
     def correct(model, work, h, soft):
@@ -282,6 +284,7 @@ def make_impulses(features):
                 here, A, B, ma, mb = ends(model, work, k)
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                 sweep(here, a, b, A, B, ma, mb, model.side[k], h, soft)
+                join_speeds(model, work)
 
     @kernel
     def finish(model, state, work, g, k, h, elapsed):
@@ -292,10 +295,11 @@ def make_impulses(features):
             owner.pressed[i] = 0.0
         candidate = state.candidate[g, first : first + here.shape[0]]
         book(here, candidate, owner, surface, keeps, h, owner.pressed)
-        note_touch(work, k, owner.pressed, elapsed)
+        note_touch(model, work, k, owner.pressed, elapsed)
 
     @kernel
     def impulses(model, state, work, g, h, drifted, elapsed):
+        clear_pressed(model, work)
         sides, touching = model.side.shape[0], 0
         for k in range(sides):
             touching += work.side[k].slots
@@ -316,6 +320,7 @@ def make_impulses(features):
                 here, A, B, ma, mb = ends(model, work, k)
                 a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
                 warm(here, a, b, A, B, ma, mb)
+        join_speeds(model, work)
         correct(model, work, h, True)
         for k in range(sides):
             if work.side[k].slots > 0:

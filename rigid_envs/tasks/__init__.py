@@ -1,8 +1,10 @@
 """The tasks, one a file: initial state, action, observation, goal and reward terms in NumPy."""
 
 from rigid_envs.tasks.push import Push
+from rigid_envs.tasks.stack import Stack
 from rigid_envs.tasks.task import Task
+from rigid_envs.tasks.throw import Throw
 
-TASKS: dict[str, type[Task]] = {"push": Push}
+TASKS: dict[str, type[Task]] = {"push": Push, "stack": Stack, "throw": Throw}
 
-__all__ = ["TASKS", "Push", "Task"]
+__all__ = ["TASKS", "Push", "Stack", "Task", "Throw"]

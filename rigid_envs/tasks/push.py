@@ -1,7 +1,5 @@
 """Push: a finger on a carriage pushes a cube over the ground to a goal."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from physics import Body, Box, Drive, Ground, Material, Readout, Scene, Sphere, World
@@ -25,8 +23,8 @@ TRIES = 6
 class Push(Task):
     """Cube and goal lie anywhere within 15 cm of the origin; solved within 5 cm of the goal."""
 
-    actions: ClassVar = ("finger x", "finger y", "finger z")
-    bounds: ClassVar = (
+    actions = ("finger x", "finger y", "finger z")
+    bounds = (
         *((f"finger {a}", "m", -0.5, 0.5) for a in "xyz"),
         *((f"finger velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
         *((f"cube {a}", "m", -1.0, 1.0) for a in "xyz"),
@@ -35,9 +33,9 @@ class Push(Task):
         *((f"cube angular velocity {a}", "rad/s", -1000.0, 1000.0) for a in "xyz"),
         *((f"finger to cube {a}", "m", -1.5, 1.5) for a in "xyz"),
     )
-    goal_bounds: ClassVar = tuple((f"cube {a}", "m", -1.0, 1.0) for a in "xyz")
-    draws: ClassVar = 3 + 2 * TRIES
-    reward = Reward(threshold=THRESHOLD, scale=0.1, weights={"reach": 0.3})
+    goal_bounds = tuple((f"cube {a}", "m", -1.0, 1.0) for a in "xyz")
+    draws = 3 + 2 * TRIES
+    reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
 
     def scene(self) -> Scene:
         """A cube on the ground, and a finger above it."""
@@ -72,22 +70,22 @@ class Push(Task):
         target = np.minimum(np.maximum(finger + STRIDE * actions, LOW), HIGH)
         world.command_drives(((target - finger) / self.frame)[:, None])
 
-    def observe(self, now: Readout, out: Array) -> None:
+    def observe(self, world: World, now: Readout, out: Array) -> None:
         """Poses and velocities of finger and cube, and the way from one to the other."""
         rows = now.rows
         out[:, 0:3], out[:, 3:6] = rows[:, 1, 0:3], rows[:, 1, 7:10]
         out[:, 6:19] = rows[:, 0]
         np.subtract(rows[:, 0, :3], rows[:, 1, :3], out=out[:, 19:22], casting="same_kind")
 
-    def achieved(self, now: Readout) -> Array:
+    def achieved(self, world: World, now: Readout) -> Array:
         """Where the cube is."""
         return now.position[:, 0]
 
     def terms(
-        self, now: Readout, achieved: Array, desired: Array, apart: Array
+        self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
-        """`reach`: minus the finger's way to the side of the cube that faces away from the goal."""
+        """`reach`: m, minus the finger's way to the cube's side that faces away from the goal."""
         away = achieved - desired
         ratio = (1.6 * HALF + FINGER) / np.maximum(apart, 1e-6)
         behind = achieved + away * ratio[:, None]
-        return {"reach": distance(now.position[:, 1], behind) / -self.reward.scale}
+        return {"reach": -distance(now.position[:, 1], behind)}

@@ -21,13 +21,16 @@ class Task(ABC):
         goal_bounds: likewise of a goal.
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
+
+    What an instance needs to know beyond its class, as a number of blocks, are arguments of its
+    constructor, which gym.make hands on.
     """
 
     frame: ClassVar[float] = 1.0 / 25.0
-    actions: ClassVar[tuple[str, ...]]
-    bounds: ClassVar[tuple[tuple[str, str, float, float], ...]]
-    goal_bounds: ClassVar[tuple[tuple[str, str, float, float], ...]]
-    draws: ClassVar[int]
+    actions: tuple[str, ...]
+    bounds: tuple[tuple[str, str, float, float], ...]
+    goal_bounds: tuple[tuple[str, str, float, float], ...]
+    draws: int
     reward: Reward
 
     @abstractmethod
@@ -52,16 +55,16 @@ class Task(ABC):
         """Commands the drives by actions [count, actions] within [-1, 1]."""
 
     @abstractmethod
-    def observe(self, now: Readout, out: Array) -> None:
+    def observe(self, world: World, now: Readout, out: Array) -> None:
         """Writes observations [count, observation]."""
 
     @abstractmethod
-    def achieved(self, now: Readout) -> Array:
+    def achieved(self, world: World, now: Readout) -> Array:
         """Achieved goals [count, goal]."""
 
     @abstractmethod
     def terms(
-        self, now: Readout, achieved: Array, desired: Array, apart: Array
+        self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
         """Raw reward terms [count] that can't be had from the goals [count, goal] alone.
 

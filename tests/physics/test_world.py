@@ -129,7 +129,7 @@ def test_without_a_stiffness_no_step_is_too_long():
 def test_a_servo_that_the_step_cannot_carry_is_refused():
     scene = Scene([], drives=[Drive(BALL, 0.1, 5.0, frequency=900.0)])
     with pytest.raises(
-        ValueError, match=r"Drive\.frequency 900 .* drive 0 .*safe step is (\S+) s"
+        ValueError, match=r"Drive\.frequency 900 .* tool 0 .*safe step is (\S+) s"
     ) as e:
         World(scene)
     safe = float(str(e.value).split("largest safe step is ")[1].split()[0].rstrip(";"))

@@ -6,7 +6,7 @@ import pytest
 from rigid_envs.rewards import Reward, distance
 from tests.rigid_envs.rollout import REWARDS, make, make_vec, random_actions, steps_of
 
-REWARD = Reward(threshold=0.05, scale=0.1, weights={"reach": 0.3})
+REWARD = Reward(threshold=0.05, weights={"success": 1.0, "distance": 10.0, "reach": 0.3})
 ORIGIN = np.zeros(3, dtype=np.float32)
 
 
@@ -22,11 +22,20 @@ def test_sparse_reward_is_zero_within_the_threshold_and_minus_one_beyond(apart, 
     assert REWARD.compute("sparse", ORIGIN, goal, {}) == reward
 
 
-def test_dense_reward_is_distance_over_scale_plus_solved_plus_weighted_terms():
+def test_dense_reward_is_the_sum_of_weighted_terms():
     near = np.array([0.03, 0.0, 0.04], dtype=np.float32)
     far = np.array([0.3, 0.0, 0.4], dtype=np.float32)
     assert REWARD.compute("dense", far, ORIGIN, {"reach": -2.0}) == pytest.approx(-5.0 - 0.6)
     assert REWARD.compute("dense", 0.9 * near, ORIGIN, {"reach": 1.0}) == pytest.approx(0.85)
+
+
+def test_goals_are_as_far_apart_as_their_farthest_points():
+    one, other = np.zeros((1, 7)), np.array([[0.03, 0.0, 0.04, 0.0, 0.06, 0.08, 0.02]])
+    assert distance(one, other)[0] == pytest.approx(0.1)
+    other[0, 6] = -1.0  # what is left over is a point of one component
+    assert distance(one, other)[0] == 1.0
+    other[0, 1] = np.nan
+    assert np.isnan(distance(one, other)[0])
 
 
 def test_distance_of_a_row_does_not_depend_on_how_many_rows_there_are():

@@ -1,0 +1,82 @@
+"""Hand: a parallel gripper as a task's tool: its scene, its actions and what it tells of itself.
+
+The hand moves along x, y and z; its fingers close along y. Two cubes of 2 cm, its pads, are all of
+it that touches. Where its weight or a load pulls it from its reference, it stays: an action counts
+from the reference, of which the hand may be short by a stride and a half, no more.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from physics import Box, Gripper, Material, Readout, World
+
+Array = np.ndarray
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A gripper with its workspace.
+
+    Args:
+        home: m, where it is at the start.
+        low: m, lower corner of its workspace.
+        high: m, upper corner.
+        stride: m a step along each axis at full action.
+        widest: m between the pads when open.
+    """
+
+    home: Vector
+    low: Vector
+    high: Vector
+    stride: float
+    widest: float = 0.08
+
+    PAD: ClassVar[float] = 0.01  # m, half the width of a pad
+    FINGER_MASS: ClassVar[float] = 0.15  # kg
+    FORCE: ClassVar[float] = 30.0  # N of the carriage along each axis
+    GRIP: ClassVar[float] = 3.0  # N with which each finger presses
+
+    actions: ClassVar = ("hand x", "hand y", "hand z", "grip")
+    bounds: ClassVar = (
+        *((f"hand {a}", "m", -1.0, 1.0) for a in "xyz"),
+        *((f"hand velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
+        ("opening", "m", -0.05, 0.2),
+        ("opening velocity", "m/s", -20.0, 20.0),
+    )
+
+    def gripper(self, opening: float, material: Material) -> Gripper:
+        """The tool, with so many m between its pads."""
+        return Gripper(
+            Box((self.PAD,) * 3),
+            mass=self.FINGER_MASS,
+            force_limit=self.FORCE,
+            grip_limit=self.GRIP,
+            position=self.home,
+            distance=opening + 2.0 * self.PAD,
+            material=material,
+        )
+
+    def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
+        """Moves the hand by up to a stride along each axis; grip -1 closes it and 1 opens it."""
+        reference = world.drive_reference.mean(axis=1)
+        hand = now.position[:, -2:].mean(axis=1)
+        target = reference + self.stride * actions[:, :3]
+        slack = 1.5 * self.stride
+        target = np.minimum(np.maximum(target, hand - slack), hand + slack)
+        target = np.minimum(np.maximum(target, self.low), self.high)
+        apart = self.widest * 0.5 * (actions[:, 3] + 1.0) + 2.0 * self.PAD
+        fingers = np.stack([target, target], axis=1)
+        fingers[:, 0, 1] -= 0.5 * apart
+        fingers[:, 1, 1] += 0.5 * apart
+        world.move_drives(fingers, frame)
+
+    def observe(self, now: Readout, out: Array) -> None:
+        """Writes what `bounds` names, [count, 8]."""
+        near, far = now.rows[:, -2], now.rows[:, -1]
+        out[:, 0:3] = 0.5 * (near[:, 0:3] + far[:, 0:3])
+        out[:, 3:6] = 0.5 * (near[:, 7:10] + far[:, 7:10])
+        out[:, 6] = far[:, 1] - near[:, 1] - 2.0 * self.PAD
+        out[:, 7] = far[:, 8] - near[:, 8]

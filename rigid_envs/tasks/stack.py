@@ -1,0 +1,147 @@
+"""Stack: a gripper builds a tower of cubes at a goal."""
+
+import numpy as np
+
+from physics import Body, Box, Ground, Material, Readout, Scene, World
+from physics.validation import integer
+from rigid_envs.rewards import Reward, distance
+from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.task import Task
+
+Array = np.ndarray
+
+HALF = 0.02  # m, half a cube's width
+MASS = 0.1  # kg
+CELL = (
+    0.1  # m, of a grid of 3 x 3 places about the origin, in each of which starts at most one cube
+)
+JITTER = 0.01  # m, by which cube or goal may lie beside the middle of its place
+THRESHOLD = 0.02  # m
+REACH = 0.1  # m, over which the shaped terms fall
+PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
+
+
+class Stack(Task):
+    """Cube i belongs at level i of the tower; solved when all stand and no finger touches any.
+
+    Args:
+        blocks: number of cubes, 2 to 5.
+    """
+
+    hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.012), high=(0.2, 0.2, 0.3), stride=0.05)
+
+    def __init__(self, blocks: int = 2) -> None:
+        """Lists what is observed of so many cubes."""
+        self.blocks = integer("blocks", blocks, low=2)
+        if self.blocks > 5:
+            raise ValueError(f"blocks must be at most 5, got {blocks!r}")
+        self.actions = self.hand.actions
+        self.bounds = (
+            *self.hand.bounds,
+            *(entry for i in range(self.blocks) for entry in _cube_bounds(f"cube {i}")),
+        )
+        self.goal_bounds = (
+            *((f"cube {i} {a}", "m", -1.0, 1.0) for i in range(self.blocks) for a in "xyz"),
+            ("released", "m", 0.0, 1.0),
+        )
+        self.draws = len(PLACES) + 2 * (self.blocks + 1)
+        self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0})
+
+    def scene(self) -> Scene:
+        """Cubes on the ground, and an open gripper above them."""
+        material = Material(friction=0.5, restitution=0.1)
+        pads = Material(friction=2.0, restitution=0.0)
+        cube = Box((HALF,) * 3)
+        return Scene(
+            bodies=[
+                Body(cube, mass=MASS, position=(*PLACES[i], HALF), material=material)
+                for i in range(self.blocks)
+            ],
+            statics=[Ground(material)],
+            drives=[self.hand.gripper(self.hand.widest, pads)],
+        )
+
+    def start(self, world: World, mask: Array, draws: Array) -> Array:
+        """Cubes in places of their own, square to the fingers; the tower in one that is free."""
+        n, count = self.blocks, len(draws)
+        order = np.argsort(draws[:, : len(PLACES)], axis=1)[:, : n + 1]
+        jitter = JITTER * (2.0 * draws[:, len(PLACES) :].reshape(count, n + 1, 2) - 1.0)
+        places = PLACES[order] + jitter
+        position = np.full((count, n, 3), HALF)
+        position[:, :, :2] = places[:, :n]
+        world.reset(mask)
+        world.set_state(position=position, worlds=mask)
+
+        goals = np.ones((count, 3 * n + 1))
+        tower = goals[:, :-1].reshape(count, n, 3)
+        tower[:, :, :2] = places[:, n, None]
+        tower[:, :, 2] = HALF * (1.0 + 2.0 * np.arange(n))
+        return goals
+
+    def act(self, world: World, now: Readout, actions: Array) -> None:
+        """Moves the hand by up to 5 cm along each axis, and its fingers."""
+        self.hand.act(world, now, actions, self.frame)
+
+    def observe(self, world: World, now: Readout, out: Array) -> None:
+        """The hand; poses and velocities of the cubes, and the way from the hand to each."""
+        first = len(self.hand.bounds)
+        self.hand.observe(now, out[:, :first])
+        cubes = out[:, first:].reshape(len(out), self.blocks, 16)
+        cubes[:, :, :13] = now.rows[:, : self.blocks]
+        cubes[:, :, 13:] = now.position[:, : self.blocks] - out[:, None, 0:3]
+        out[:, first:] = cubes.reshape(len(out), -1)
+
+    def achieved(self, world: World, now: Readout) -> Array:
+        """Where the cubes are, and 1 where no finger touches any."""
+        goals = np.empty((len(now.rows), 3 * self.blocks + 1))
+        goals[:, :-1] = now.position[:, : self.blocks].reshape(len(goals), -1)
+        goals[:, -1] = self._pressing(world).max(axis=(1, 2)) <= 0.0
+        return goals
+
+    def terms(
+        self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
+    ) -> dict[str, Array]:
+        """`placed`: cubes that stand, from below; `reach`, `grasp` and `place` of the next.
+
+        They are 0 to 1, and so is `stage`, all of it in one number.
+        """
+        n = self.blocks
+        cubes = achieved[:, :-1].reshape(-1, n, 3)
+        away = distance(cubes, desired[:, :-1].reshape(-1, n, 3))
+        placed = np.cumprod(away <= THRESHOLD, axis=1).sum(axis=1)
+        done, next_one = placed == n, np.minimum(placed, n - 1)
+        worlds = np.arange(len(cubes))
+        hand = now.position[:, n:].mean(axis=1)
+        near = _near(distance(cubes[worlds, next_one], hand))
+        held = self._pressing(world)[worlds, next_one].min(axis=1) > 0.0
+        place = _near(away[worlds, next_one])
+        free = achieved[:, -1]
+        stage = np.where(done, 0.5 * free, 0.3 * near + 0.2 * held + 0.5 * place)
+        return {
+            "placed": placed.astype(float),
+            "reach": np.where(done, 1.0, near),
+            "grasp": np.where(done, free, held).astype(float),
+            "place": np.where(done, 1.0, place),
+            "stage": (placed + stage) / (n + 0.5),
+        }
+
+    def _pressing(self, world: World) -> Array:
+        """[count, blocks, 2] N with which each finger presses each cube."""
+        n = self.blocks
+        pairs = [world.pressing(i, n + finger) for i in range(n) for finger in (0, 1)]
+        return np.stack(pairs, axis=1).reshape(-1, n, 2)
+
+
+def _near(apart: Array) -> Array:
+    """1 at no distance, falling to 0 over some `REACH` m."""
+    return 1.0 - np.tanh(apart / REACH)
+
+
+def _cube_bounds(name: str) -> tuple[tuple[str, str, float, float], ...]:
+    return (
+        *((f"{name} {a}", "m", -1.0, 1.0) for a in "xyz"),
+        *((f"{name} quaternion {a}", "", -1.0, 1.0) for a in "xyzw"),
+        *((f"{name} velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
+        *((f"{name} angular velocity {a}", "rad/s", -1000.0, 1000.0) for a in "xyz"),
+        *((f"hand to {name} {a}", "m", -2.0, 2.0) for a in "xyz"),
+    )

@@ -1,0 +1,82 @@
+"""Throw: a hand that holds a ball swings and lets go, to hit a place beyond its reach."""
+
+import numpy as np
+
+from physics import Body, Ground, Material, Readout, Scene, Sphere, World
+from rigid_envs.rewards import Reward, distance
+from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.task import Task
+
+Array = np.ndarray
+
+RADIUS = 0.02  # m
+MASS = 0.05  # kg
+NEAREST, FARTHEST = 0.5, 1.2  # m of the target from the origin
+ASIDE = 0.4  # rad, by which it may lie to either side of x
+THRESHOLD = 0.1  # m
+BALL, FINGERS, GROUND = 0, (1, 2), 3  # solids
+GRAVITY = 9.81  # m/s^2
+
+
+class Throw(Task):
+    """Where the ball first touches the ground counts, and before that, where it is."""
+
+    hand = Hand(home=(-0.1, 0.0, 0.25), low=(-0.3, -0.2, 0.1), high=(0.3, 0.2, 0.5), stride=0.12)
+
+    actions = hand.actions
+    bounds = (
+        *hand.bounds,
+        *((f"ball {a}", "m", -5.0, 5.0) for a in "xyz"),
+        *((f"ball velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
+        *((f"hand to ball {a}", "m", -5.0, 5.0) for a in "xyz"),
+        ("landed", "", 0.0, 1.0),
+    )
+    goal_bounds = tuple((f"ball {a}", "m", -5.0, 5.0) for a in "xyz")
+    draws = 2
+    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0})
+
+    def scene(self) -> Scene:
+        """A ball between the pads of a hand above the ground."""
+        material = Material(friction=0.5, restitution=0.3, rolling_resistance=0.002)
+        pads = Material(friction=2.0, restitution=0.0)
+        ball = Body(Sphere(RADIUS), mass=MASS, position=self.hand.home, material=material)
+        hand = self.hand.gripper(2.0 * RADIUS, pads)
+        return Scene(bodies=[ball], statics=[Ground(material)], drives=[hand])
+
+    def start(self, world: World, mask: Array, draws: Array) -> Array:
+        """The hand at home, the ball in it; the target in a sector of a ring, by even area."""
+        world.reset(mask)
+        square = NEAREST**2 + (FARTHEST**2 - NEAREST**2) * draws[:, 0]
+        far, angle = np.sqrt(square), ASIDE * (2.0 * draws[:, 1] - 1.0)
+        return np.stack([far * np.cos(angle), far * np.sin(angle), np.full(len(far), RADIUS)], 1)
+
+    def act(self, world: World, now: Readout, actions: Array) -> None:
+        """Moves the hand by up to 12 cm along each axis, and its fingers."""
+        self.hand.act(world, now, actions, self.frame)
+
+    def observe(self, world: World, now: Readout, out: Array) -> None:
+        """The hand, the ball, the way from one to the other, and whether the ball has landed."""
+        first = len(self.hand.bounds)
+        self.hand.observe(now, out[:, :first])
+        ball = now.rows[:, BALL]
+        out[:, first : first + 3] = ball[:, 0:3]
+        out[:, first + 3 : first + 6] = ball[:, 7:10]
+        out[:, first + 6 : first + 9] = ball[:, 0:3] - out[:, 0:3]
+        out[:, first + 9] = ~np.isnan(world.first_touch(BALL, GROUND))
+
+    def achieved(self, world: World, now: Readout) -> Array:
+        """The ball's centre, as it first touched the ground or as it is."""
+        landed = world.first_touch_position(BALL, GROUND)
+        return np.where(np.isnan(landed), now.position[:, BALL], landed)
+
+    def terms(
+        self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
+    ) -> dict[str, Array]:
+        """`aim`: m, minus the distance of the target from where the ball would land, let go now."""
+        landed = ~np.isnan(world.first_touch(BALL, GROUND))
+        speed = now.linear_velocity[:, BALL]
+        height = np.maximum(achieved[:, 2] - RADIUS, 0.0).astype(float)
+        flight = (speed[:, 2] + np.sqrt(speed[:, 2] ** 2 + 2.0 * GRAVITY * height)) / GRAVITY
+        lands = achieved + np.where(landed, 0.0, flight)[:, None] * speed
+        lands[:, 2] = RADIUS
+        return {"aim": -distance(lands, desired), "landed": landed.astype(float)}
