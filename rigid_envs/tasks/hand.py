@@ -1,8 +1,8 @@
 """Hand: a parallel gripper as a task's tool: its scene, its actions and what it tells of itself.
 
-The hand moves along x, y and z; its fingers close along y. Two cubes of 2 cm, its pads, are all of
+The hand moves along x, y and z; its fingers close along y. Two cubes of 3 cm, its pads, are all of
 it that touches. Where its weight or a load pulls it from its reference, it stays: an action counts
-from the reference, of which the hand may be short by a stride and a half, no more.
+from the reference, of which the hand may be short by three quarters of a stride, no more.
 """
 
 from dataclasses import dataclass
@@ -34,10 +34,15 @@ class Hand:
     stride: float
     widest: float = 0.08
 
-    PAD: ClassVar[float] = 0.01  # m, half the width of a pad
-    FINGER_MASS: ClassVar[float] = 0.15  # kg
-    FORCE: ClassVar[float] = 30.0  # N of the carriage along each axis
-    GRIP: ClassVar[float] = 3.0  # N with which each finger presses
+    PAD: ClassVar[float] = 0.015  # m, half the width of a pad
+    FINGER_MASS: ClassVar[float] = 0.3  # kg
+    FORCE: ClassVar[float] = 14.0  # N of the carriage along each axis
+    FREQUENCY: ClassVar[float] = (
+        40.0  # rad/s, of its servos: it starts no faster than pads can hold
+    )
+    GRIP: ClassVar[float] = 4.0  # N with which each finger presses
+
+    DAMPING: ClassVar[float] = 1.0  # of its servos, a share of critical
 
     actions: ClassVar = ("hand x", "hand y", "hand z", "grip")
     bounds: ClassVar = (
@@ -45,6 +50,7 @@ class Hand:
         *((f"hand velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
         ("opening", "m", -0.05, 0.2),
         ("opening velocity", "m/s", -20.0, 20.0),
+        *((f"hand reference {a}", "m", -1.0, 1.0) for a in "xyz"),
     )
 
     def gripper(self, opening: float, material: Material) -> Gripper:
@@ -56,27 +62,31 @@ class Hand:
             grip_limit=self.GRIP,
             position=self.home,
             distance=opening + 2.0 * self.PAD,
+            frequency=self.FREQUENCY,
+            damping_ratio=self.DAMPING,
             material=material,
         )
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by up to a stride along each axis; grip -1 closes it and 1 opens it."""
-        reference = world.drive_reference.mean(axis=1)
+        reference = world.drive_reference[:, -2:].mean(axis=1)
         hand = now.position[:, -2:].mean(axis=1)
         target = reference + self.stride * actions[:, :3]
-        slack = 1.5 * self.stride
+        slack = 0.75 * self.stride
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
         apart = self.widest * 0.5 * (actions[:, 3] + 1.0) + 2.0 * self.PAD
-        fingers = np.stack([target, target], axis=1)
-        fingers[:, 0, 1] -= 0.5 * apart
-        fingers[:, 1, 1] += 0.5 * apart
+        fingers = world.drive_reference.copy()
+        fingers[:, -2:] = target[:, None]
+        fingers[:, -2, 1] -= 0.5 * apart
+        fingers[:, -1, 1] += 0.5 * apart
         world.move_drives(fingers, frame)
 
-    def observe(self, now: Readout, out: Array) -> None:
-        """Writes what `bounds` names, [count, 8]."""
+    def observe(self, world: World, now: Readout, out: Array) -> None:
+        """Writes what `bounds` names, [count, 11]."""
         near, far = now.rows[:, -2], now.rows[:, -1]
         out[:, 0:3] = 0.5 * (near[:, 0:3] + far[:, 0:3])
         out[:, 3:6] = 0.5 * (near[:, 7:10] + far[:, 7:10])
         out[:, 6] = far[:, 1] - near[:, 1] - 2.0 * self.PAD
         out[:, 7] = far[:, 8] - near[:, 8]
+        out[:, 8:11] = world.drive_reference[:, -2:].mean(axis=1)

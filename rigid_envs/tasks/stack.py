@@ -12,9 +12,8 @@ Array = np.ndarray
 
 HALF = 0.02  # m, half a cube's width
 MASS = 0.1  # kg
-CELL = (
-    0.1  # m, of a grid of 3 x 3 places about the origin, in each of which starts at most one cube
-)
+# m, of a grid of 3 x 3 places about the origin, in each of which starts at most one cube
+CELL = 0.12
 JITTER = 0.01  # m, by which cube or goal may lie beside the middle of its place
 THRESHOLD = 0.02  # m
 REACH = 0.1  # m, over which the shaped terms fall
@@ -28,7 +27,7 @@ class Stack(Task):
         blocks: number of cubes, 2 to 5.
     """
 
-    hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.012), high=(0.2, 0.2, 0.3), stride=0.05)
+    hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
 
     def __init__(self, blocks: int = 2) -> None:
         """Lists what is observed of so many cubes."""
@@ -85,7 +84,7 @@ class Stack(Task):
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """The hand; poses and velocities of the cubes, and the way from the hand to each."""
         first = len(self.hand.bounds)
-        self.hand.observe(now, out[:, :first])
+        self.hand.observe(world, now, out[:, :first])
         cubes = out[:, first:].reshape(len(out), self.blocks, 16)
         cubes[:, :, :13] = now.rows[:, : self.blocks]
         cubes[:, :, 13:] = now.position[:, : self.blocks] - out[:, None, 0:3]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from physics import Body, Ground, Material, Readout, Scene, Sphere, World
+from physics import Body, Fidelity, Ground, Material, Readout, Scene, Sphere, World
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.hand import Hand
 from rigid_envs.tasks.task import Task
@@ -43,12 +43,30 @@ class Throw(Task):
         hand = self.hand.gripper(2.0 * RADIUS, pads)
         return Scene(bodies=[ball], statics=[Ground(material)], drives=[hand])
 
+    def __init__(self) -> None:
+        """Nothing is known yet of how deep pads press into the ball."""
+        self._held: dict[Fidelity, tuple[Array, Array]] = {}
+
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """The hand at home, the ball in it; the target in a sector of a ring, by even area."""
+        if world.fidelity not in self._held:
+            self._held[world.fidelity] = self._hold(world.fidelity)
+        fingers, ball = self._held[world.fidelity]
         world.reset(mask)
+        world.set_state(drive_position=fingers, position=ball, worlds=mask)
         square = NEAREST**2 + (FARTHEST**2 - NEAREST**2) * draws[:, 0]
         far, angle = np.sqrt(square), ASIDE * (2.0 * draws[:, 1] - 1.0)
         return np.stack([far * np.cos(angle), far * np.sin(angle), np.full(len(far), RADIUS)], 1)
+
+    def _hold(self, fidelity: Fidelity) -> tuple[Array, Array]:
+        """Where fingers and ball are once the grip has closed: how deep depends on the fidelity."""
+        world = World(self.scene(), fidelity)
+        closed = np.array(self.hand.home) + np.zeros((2, 3))
+        world.move_drives(closed, self.frame)
+        for _ in range(10):
+            world.advance(self.frame)
+            world.move_drives(closed, self.frame)
+        return world.drive_position.copy(), world.position.copy()
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 12 cm along each axis, and its fingers."""
@@ -57,7 +75,7 @@ class Throw(Task):
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """The hand, the ball, the way from one to the other, and whether the ball has landed."""
         first = len(self.hand.bounds)
-        self.hand.observe(now, out[:, :first])
+        self.hand.observe(world, now, out[:, :first])
         ball = now.rows[:, BALL]
         out[:, first : first + 3] = ball[:, 0:3]
         out[:, first + 3 : first + 6] = ball[:, 7:10]

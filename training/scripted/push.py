@@ -1,15 +1,10 @@
-"""Controllers that solve a task by reading only the observation: proof that physics allows it."""
-
-from collections.abc import Callable
+"""A controller of Push."""
 
 import numpy as np
 
 from rigid_envs.tasks.push import FINGER, HALF, STRIDE
 
 Array = np.ndarray
-
-Controller = Callable[[dict[str, Array]], Array]
-"""Takes observations `{key: (n, k)}` and returns actions `(n, action_dim)` within ±1."""
 
 # m above the ground at which the finger travels without touching the cube
 _TRAVEL = 2.0 * HALF + FINGER + 0.02
@@ -54,7 +49,3 @@ def push(observation: dict[str, Array]) -> Array:
     solved = apart[:, 0] < _DONE
     target[solved] = finger[solved]
     return np.clip((target - finger) / STRIDE, -1.0, 1.0)
-
-
-CONTROLLERS: dict[str, Controller] = {"RigidEnvs/Push-v0": push}
-"""Controller of each environment id."""
