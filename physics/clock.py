@@ -83,15 +83,12 @@ def make_advance(features: Features):
     def advance(model, state, work, rows, chosen, first, last, h, substeps, collision_substeps):
         _ = sources
         for g in range(first, last):
-            place_statics(model, work)  # a group that diverged leaves nothing for the next
-            load(model, state, work, chosen, g)
-            lane = work.lane[0]
-            active, stale = 0, 0
-            for i in range(LANES):
-                active += lane.active[i]
-                stale += lane.stale[i]
-            if active == 0:
+            if load(model, state, work, chosen, g) == 0:
                 continue
+            place_statics(model, work)  # a group that diverged leaves nothing for the next
+            lane, stale = work.lane[0], 0
+            for i in range(LANES):
+                stale += lane.stale[i]
             for i in range(LANES):
                 if lane.active[i]:
                     state.world[g * LANES + i].overflow = 0

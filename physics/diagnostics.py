@@ -1,5 +1,6 @@
 """Numbers that a user can ask of any world: energy, momentum, overlap, contacts."""
 
+import functools
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -164,7 +165,10 @@ def contacts(model: Model, features: Features, state: State, world: int) -> Cont
     told = report(model, features, state, world)
     side = model.side[told.side]
     pair = np.stack([side["owner"], side["surface"]], axis=-1)
-    first = {ends: first_touch(model, state, *ends)[world] for ends in set(map(tuple, pair))}
+    first = {
+        ends: first_touch(state, np.flatnonzero(between(model, *ends)))[world]
+        for ends in set(map(tuple, pair))
+    }
     return Contacts(
         pair=pair,
         point=told.point,
@@ -175,25 +179,27 @@ def contacts(model: Model, features: Features, state: State, world: int) -> Cont
     )
 
 
-def first_touch(model: Model, state: State, first: int, second: int) -> Array:
-    """When two solids first touched, [w] s, NaN before; all NaN if they never meet."""
-    touches = state.side["first_touch"][:, between(model, first, second)]
-    return np.fmin.reduce(touches, axis=1, initial=np.nan)
+def first_touch(state: State, sides: Array) -> Array:
+    """When two solids first touched, [w] s, NaN before, by the sides between them."""
+    touches = state.side["first_touch"]
+    return np.asarray(functools.reduce(np.fmin, (touches[:, k] for k in sides)))
 
 
-def first_touch_position(model: Model, state: State, first: int, second: int) -> Array:
+def first_touch_position(state: State, sides: Array) -> Array:
     """Where the first of two solids was then, [w, 3] m, NaN before."""
-    sides = np.flatnonzero(between(model, first, second))
-    touches = state.side["first_touch"][:, sides]
-    found = ~np.isnan(touches).all(axis=1)
-    earliest = sides[np.argmin(np.where(np.isnan(touches), np.inf, touches), axis=1)]
-    places = state.side["first_position"][np.arange(len(found)), earliest]
-    return np.where(found[:, None], places, np.nan)
+    touches, places = state.side["first_touch"], state.side["first_position"]
+    first = np.full(len(touches), np.inf)
+    found = np.full((len(touches), 3), np.nan)
+    for k in sides:
+        sooner = touches[:, k] < first
+        first[sooner], found[sooner] = touches[sooner, k], places[sooner, k]
+    return found
 
 
-def pressing(model: Model, state: State, first: int, second: int) -> Array:
+def pressing(state: State, sides: Array) -> Array:
     """Sum of the normal forces between two solids in the last step, [w] N."""
-    return state.side["pressed"][:, between(model, first, second)].sum(axis=1)
+    pressed = state.side["pressed"]
+    return np.asarray(functools.reduce(np.add, (pressed[:, k] for k in sides)))
 
 
 def between(model: Model, first: int, second: int) -> Array:

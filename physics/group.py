@@ -31,7 +31,8 @@ SOLID = np.dtype(
         ("rotation", "f8", (9, LANES)),  # matrix, row by row: body frame to world frame
         ("velocity", "f8", (3, LANES)),  # m/s
         ("spin", "f8", (3, LANES)),  # rad/s
-        ("path", "f8", (LANES,)),  # m that a surface point has moved at most in the last drift
+        ("moved", "f8", (3, LANES)),  # m, by the last drift
+        ("swept", "f8", (LANES,)),  # m that a surface point was turned beyond that, at most
         # of the side at work
         ("pressed", "f8", (LANES,)),  # N, sum of normal forces
         ("bearing", "f8", (LANES,)),  # sum of the weights that touch
@@ -195,8 +196,17 @@ def count_slots(work, k):
 
 @stage
 def load(model, state, work, chosen, g):
-    """Takes the chosen worlds of group g into the lanes; other lanes rest at the origin."""
-    lane = work.lane[0]
+    """Takes the chosen worlds of group g into the lanes; other lanes rest at the origin.
+
+    Returns how many there are; nothing is taken if none.
+    """
+    lane, count = work.lane[0], 0
+    for i in range(LANES):
+        w = g * LANES + i
+        if w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0:
+            count += 1
+    if count == 0:
+        return 0
     for i in range(LANES):
         w = g * LANES + i
         active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
@@ -206,7 +216,9 @@ def load(model, state, work, chosen, g):
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.mover.shape[0]):
             solid = work.solid[m]
-            solid.path[i] = 0.0
+            solid.swept[i] = 0.0
+            for c in range(3):
+                solid.moved[c, i] = 0.0
             if active:
                 row = state.mover[w, m]
                 for c in range(3):
@@ -248,6 +260,7 @@ def load(model, state, work, chosen, g):
                 side.bore[i] = 0.0
     for k in range(model.side.shape[0]):
         count_slots(work, k)
+    return count
 
 
 @stage

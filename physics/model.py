@@ -157,10 +157,15 @@ def _sides(scene: Scene, fidelity: Fidelity) -> Iterator[Side]:
             return solid.shape.particles(spacing)
         return solid.shape.samples(spacing, rounding(solid))
 
+    # a gripper's servo keeps its fingers apart
+    first_tool = len(scene.bodies)
+    twins = {(first_tool + first, first_tool + first + 1) for first, _ in scene.grippers}
     for i, a in enumerate(solids[:movers]):
         assert not isinstance(a, Static | Ground)
         for j in range(i + 1, len(solids)):
             b = solids[j]
+            if (i, j) in twins:
+                continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
                 yield Side(i, j, samples(a), plane, None)

@@ -30,6 +30,7 @@ class Readings:
     _state: State
     _rows: Array
     _rows_valid: bool
+    _sides_between: dict[tuple[int, int], Array]
     _readout: Callable[[Model, State, Array], object]
 
     def _settle(self) -> None:
@@ -152,7 +153,7 @@ class Readings:
         """
         ends = self._pair(first, second)
         self._settle()
-        return diagnostics.first_touch(self._model, self._state, *ends)
+        return diagnostics.first_touch(self._state, self._sides_between[ends])
 
     def first_touch_position(self, first: int, second: int) -> Array:
         """[count, 3] m, where the centre of one of two solids was at their first touch; NaN before.
@@ -168,16 +169,18 @@ class Readings:
                 f"{ends[1]}"
             )
         self._settle()
-        return diagnostics.first_touch_position(self._model, self._state, *ends)
+        return diagnostics.first_touch_position(self._state, self._sides_between[ends])
 
     def pressing(self, first: int, second: int) -> Array:
         """[count] N, the sum of the normal forces between two solids, as in `first_touch`."""
         ends = self._pair(first, second)
         self._settle()
-        return diagnostics.pressing(self._model, self._state, *ends)
+        return diagnostics.pressing(self._state, self._sides_between[ends])
 
     def _pair(self, first: int, second: int) -> tuple[int, int]:
-        """Two solids that can meet."""
+        """Two solids that can meet; the sides between them are then known."""
+        if (first, second) in self._sides_between:
+            return first, second
         ends = integer("first", first, low=0), integer("second", second, low=0)
         last = self._bodies + len(self.scene.tools) + len(self.scene.statics) - 1
         for name, value in zip(("first", "second"), ends, strict=True):
@@ -186,11 +189,13 @@ class Readings:
                     f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
                     f"statics), got {value}"
                 )
-        if not diagnostics.between(self._model, *ends).any():
+        sides = np.flatnonzero(diagnostics.between(self._model, *ends))
+        if not len(sides):
             raise ValueError(
                 f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
-                "one solid, or two statics, never do"
+                "one solid, two statics, or the fingers of a gripper never do"
             )
+        self._sides_between[ends] = sides
         return ends
 
     def largest_stable_step(self, world: int = 0) -> float:

@@ -6,6 +6,7 @@ be right, and nothing half-built remains.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from physics.shapes import Shape
 from physics.validation import instance, number, positive, unit_quaternion, vector
@@ -190,7 +191,8 @@ class Gripper:
     carriage all of its force. Two fingers with a limit each could press an object away sideways,
     once both are at it. Along x and z the fingers are one solid.
 
-    In a World it counts as two tools, its fingers, the one at smaller y first.
+    In a World it counts as two tools, its fingers, the one at smaller y first. They don't touch
+    each other: what moves them keeps them apart.
 
     Args:
         shape: of a finger, any shape with an exact surface.
@@ -282,7 +284,7 @@ class Scene:
             raise ValueError("Scene.bodies must hold at least one Body (or Scene.drives a Drive)")
         object.__setattr__(self, "gravity", vector("Scene.gravity", self.gravity))
 
-    @property
+    @cached_property
     def tools(self) -> tuple[Drive, ...]:
         """All driven solids in the order of a World: of a Gripper, both fingers."""
         tools: list[Drive] = []
@@ -290,7 +292,7 @@ class Scene:
             tools += drive.fingers if isinstance(drive, Gripper) else [drive]
         return tuple(tools)
 
-    @property
+    @cached_property
     def grippers(self) -> tuple[tuple[int, Gripper], ...]:
         """Every Gripper, and the index of its first finger among the tools."""
         found, first = [], 0

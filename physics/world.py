@@ -69,6 +69,8 @@ class World(Readings):
             check_step(scene, self.fidelity, self._model, self._features)
         self._find_kernels()
         self._idle: list[Work] = []
+        self._sides_between: dict[tuple[int, int], Array] = {}
+        self._settled = False
         self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
         self._state = allocate(self._model, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
@@ -112,7 +114,7 @@ class World(Readings):
     def _forget(self, worlds: Array) -> None:
         """Clears what is hidden: candidates, contact memories, forces, divergence."""
         state = self._state
-        self._rows_valid = False
+        self._rows_valid = self._settled = False
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
         state.side["first_touch"][worlds] = np.nan
@@ -183,12 +185,15 @@ class World(Readings):
         Such worlds stay marked: their first step works the forces out under its own commands, so
         that looking changes no bit.
         """
+        if self._settled:
+            return
         stale = self._state.world["stale"] != 0
         if stale.any():
             try:
                 self._run(self.fidelity.substep, 0, stale)
             finally:
                 self._state.world["stale"][stale] = 1
+        self._settled = True
 
     # --- writing ------------------------------------------------------------------------------
 
@@ -322,6 +327,7 @@ class World(Readings):
         mover, drives = self._state.mover, slice(self._bodies, None)
         mover["reference_velocity"][:, drives] = array("velocity", velocity, shape)
         mover["reference"][:, drives] = mover["position"][:, drives]
+        self._settled = False
 
     def move_drives(self, target: Any, time: float) -> None:
         """Lets every tool's reference move from where the reference is now to a target.
@@ -336,6 +342,7 @@ class World(Readings):
         mover, drives = self._state.mover, slice(self._bodies, None)
         way = array("target", target, shape) - mover["reference"][:, drives]
         mover["reference_velocity"][:, drives] = way / positive("time", time)
+        self._settled = False
 
     def snapshot(self) -> Snapshot:
         """Everything the worlds hold; `restore` continues from it to the last bit."""
@@ -359,7 +366,7 @@ class World(Readings):
             raise ValueError(f"saved must be of the same worlds; it has another {what}")
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
-        self._rows_valid = False
+        self._rows_valid = self._settled = False
 
     def _find_kernels(self) -> None:
         self._advance = make_advance(self._features)

@@ -72,12 +72,13 @@ def make_drift(features):
     def drift(model, work, time):
         for m in range(model.mover.shape[0]):
             solid, constants = work.solid[m], model.mover[m]
-            c, q, P, L, path = (
+            c, q, P, L, moved, swept = (
                 solid.position,
                 solid.orientation,
                 solid.momentum,
                 solid.angular_momentum,
-                solid.path,
+                solid.moved,
+                solid.swept,
             )
             step, reach = time * constants.inverse_mass, time * constants.reach
             j = constants.inverse_inertia
@@ -87,8 +88,10 @@ def make_drift(features):
                 c[0, i] += dx
                 c[1, i] += dy
                 c[2, i] += dz
-                # the sum of absolute values is never less than the length, and needs no root
-                path[i] = abs(dx) + abs(dy) + abs(dz)
+                moved[0, i] = dx
+                moved[1, i] = dy
+                moved[2, i] = dz
+                swept[i] = 0.0
             if rotation == NO_ROTATION or not constants.turns:
                 continue
             fastest = time * max(jx, jy, jz)
@@ -103,7 +106,8 @@ def make_drift(features):
                 q[1, i] = ny if near else y
                 q[2, i] = nz if near else z
                 q[3, i] = nw if near else w
-                path[i] += reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
+                # the sum of absolute values is never less than the length, and needs no root
+                swept[i] = reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
                 far += 0 if near else 1
             if far > 0:
                 for i in range(LANES):
@@ -116,6 +120,6 @@ def make_drift(features):
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        path[i] += reach * (abs(ox) + abs(oy) + abs(oz))
+                        swept[i] = reach * (abs(ox) + abs(oy) + abs(oz))
 
     return drift

@@ -69,24 +69,31 @@ class Hand:
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by up to a stride along each axis; grip -1 closes it and 1 opens it."""
-        reference = world.drive_reference[:, -2:].mean(axis=1)
-        hand = now.position[:, -2:].mean(axis=1)
-        target = reference + self.stride * actions[:, :3]
-        slack = 0.75 * self.stride
+        target = self.stride * actions[:, :3] + self.reference(world)
+        hand, slack = self.place(now), 0.75 * self.stride
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
-        apart = self.widest * 0.5 * (actions[:, 3] + 1.0) + 2.0 * self.PAD
-        fingers = world.drive_reference.copy()
-        fingers[:, -2:] = target[:, None]
-        fingers[:, -2, 1] -= 0.5 * apart
-        fingers[:, -1, 1] += 0.5 * apart
+        half = 0.25 * self.widest * (actions[:, 3] + 1.0) + self.PAD
+        fingers = np.empty((len(target), 2, 3))
+        fingers[:, 0] = fingers[:, 1] = target
+        fingers[:, 0, 1] -= half
+        fingers[:, 1, 1] += half
         world.move_drives(fingers, frame)
+
+    def place(self, now: Readout) -> Array:
+        """The middle between the pads, [count, 3] m."""
+        return 0.5 * (now.rows[:, -2, :3] + now.rows[:, -1, :3])
+
+    def reference(self, world: World) -> Array:
+        """Where the carriage's servo pulls to, [count, 3] m."""
+        fingers = world.drive_reference
+        return 0.5 * (fingers[:, 0] + fingers[:, 1])
 
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """Writes what `bounds` names, [count, 11]."""
         near, far = now.rows[:, -2], now.rows[:, -1]
-        out[:, 0:3] = 0.5 * (near[:, 0:3] + far[:, 0:3])
+        out[:, 0:3] = self.place(now)
         out[:, 3:6] = 0.5 * (near[:, 7:10] + far[:, 7:10])
         out[:, 6] = far[:, 1] - near[:, 1] - 2.0 * self.PAD
         out[:, 7] = far[:, 8] - near[:, 8]
-        out[:, 8:11] = world.drive_reference[:, -2:].mean(axis=1)
+        out[:, 8:11] = self.reference(world)

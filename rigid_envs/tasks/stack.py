@@ -110,7 +110,7 @@ class Stack(Task):
         placed = np.cumprod(away <= THRESHOLD, axis=1).sum(axis=1)
         done, next_one = placed == n, np.minimum(placed, n - 1)
         worlds = np.arange(len(cubes))
-        hand = now.position[:, n:].mean(axis=1)
+        hand = self.hand.place(now)
         near = _near(distance(cubes[worlds, next_one], hand))
         held = self._pressing(world)[worlds, next_one].min(axis=1) > 0.0
         place = _near(away[worlds, next_one])

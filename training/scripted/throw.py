@@ -17,7 +17,7 @@ OPEN, CLOSE = 1.0, -1.0
 
 
 def _miss(point: Array, motion: Array, goal: Array) -> Array:
-    """m between a goal and where a ball with this motion lands."""
+    """Distance in m of a goal from where a ball with this motion lands."""
     rise = motion[:, 2]
     height = np.maximum(point[:, 2] - RADIUS, 0.0)
     flight = (rise + np.sqrt(rise**2 + 2.0 * GRAVITY * height)) / GRAVITY
