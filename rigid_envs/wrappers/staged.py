@@ -20,7 +20,7 @@ class Stage:
         term: "distance" or "success" of the goals, or a raw term of the info.
         start: the term's value at which the stage begins to pay.
         done: the value at which it is complete, above or below `start`.
-        weight: what it pays when complete.
+        weight: what a step costs until the stage begins, and no longer when it is complete.
     """
 
     term: str
@@ -46,13 +46,15 @@ class Stage:
 class StagedReward(Rule):
     """Stages of which each pays once those before it are complete, in place of the reward.
 
-    r' = sum_i weight_i progress_i [all stages before i are complete], progress from 0 to 1.
-    A solved step pays for all stages, whatever the tool does, so that no stage is worth holding
-    out for. Info: `stages_done`, the number of complete stages plus the progress of the next;
+    r' = sum_i weight_i (progress_i [all stages before i are complete] - 1), progress from 0 to 1.
+    So a step costs what is still to be done, and nothing where all is: an episode that ends when
+    solved loses nothing by it. A solved step counts as complete in all stages, whatever the tool
+    does, lest it pay to hold on to an early one. One stage of "success" is the sparse reward.
+    Info: `stages_done`, the number of complete stages plus the progress of the next;
     `unstaged_reward`.
 
     Args:
-        stages: `Stage`s in their order.
+        stages: `Stage`s in their order; end with one of "success", or nearly solved pays as much.
     """
 
     stages: Sequence[Stage]
@@ -91,6 +93,6 @@ class StagedReward(Rule):
         for stage in self.stages:
             progress = np.where(success, 1.0, stage.progress(known[stage.term]))
             progress = np.where(reached, progress, 0.0)
-            paid, done = paid + stage.weight * progress, done + progress
+            paid, done = paid + stage.weight * (progress - 1.0), done + progress
             reached = progress >= 1.0
         return paid, {"stages_done": done, "unstaged_reward": reward}
