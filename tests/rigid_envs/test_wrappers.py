@@ -2,7 +2,9 @@
 
 import copy
 import pickle
+import re
 from functools import partial
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -11,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 from rigid_envs import wrappers
 from rigid_envs.goals import distance
+from rigid_envs.registration import ENVIRONMENTS
 from rigid_envs.wrappers import Stage, goal_potential
 from tests.rigid_envs.rollout import (
     EPISODE,
@@ -44,6 +47,7 @@ STACKS = [
     ("PotentialShaping", "SmoothnessPenalty", "PotentialShaping"),
 ]
 MODES = list(AutoresetMode)
+PAGE = (Path(__file__).parents[2] / "docs" / "rewards.md").read_text()
 
 
 def wrapped(env, names, namespace=wrappers):
@@ -224,3 +228,45 @@ def test_gym_make_builds_a_wrapped_environment_from_its_spec():
     assert str(again) == str(env)
     assert_same(again.reset(seed=0), env.reset(seed=0))
     assert_same(again.step(np.ones(3)), env.step(np.ones(3)))
+
+
+# --- every task, and what is told of it ---------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("env_id", "stage"),
+    [
+        ("RigidEnvs/Push-v0", Stage("reach", -0.4, -0.03)),
+        ("RigidEnvs/Stack-v0", Stage("stage", 0.0, 1.0)),
+        ("RigidEnvs/Throw-v0", Stage("aim", -1.5, -0.1)),
+    ],
+)
+def test_every_task_can_be_wrapped(env_id, stage):
+    names = tuple(ARGUMENTS)[1:]
+    envs = wrappers.vector.StagedReward(make_vec(3, env_id), [stage, *STAGES[1:]])
+    envs = wrapped(envs, names, wrappers.vector)
+    envs.reset(seed=0)
+    envs.action_space.seed(0)
+    for _ in range(10):
+        observation, reward, *_, info = envs.step(envs.action_space.sample())
+        assert 0.0 <= info["stages_done"].min() <= info["stages_done"].max() <= 3.0
+        goals = observation["achieved_goal"], observation["desired_goal"]
+        np.testing.assert_array_equal(reward, envs.compute_reward(*goals, info))
+
+
+@pytest.mark.parametrize("env_id", list(ENVIRONMENTS))
+def test_the_documentation_names_every_term(env_id):
+    task = ENVIRONMENTS[env_id][0].capitalize()
+    rows = [line for line in PAGE.splitlines() if line.startswith(f"| {task} |")]
+    named = {term for row in rows for term in re.findall(r"`(\w+)`", row.split("|")[2])}
+    told = {name for name in make_vec(1, env_id).reset(seed=0)[1] if not name.startswith("_")}
+    assert told == named | {"is_success", "success", "out_of_bounds"}
+
+
+def test_the_examples_of_the_documentation_run():
+    names: dict = {}
+    for example in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        exec(example, names)
+    envs = names["envs"]
+    envs.reset(seed=0)
+    envs.step(np.zeros((64, 3)))
