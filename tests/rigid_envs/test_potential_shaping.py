@@ -121,3 +121,17 @@ def test_a_reset_of_some_worlds_leaves_the_others_shaping_alone():
     np.testing.assert_array_equal(ours[1][~mask], theirs[1][~mask])
     expected = 0.9 * bumpy(ours[0]) - bumpy(observation)
     np.testing.assert_array_equal(ours[4]["shaping"][mask], expected[mask])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_reset_between_the_end_and_the_next_step_begins_a_paid_episode(mode):
+    envs = wrappers.vector.PotentialShaping(
+        make_vec(3, autoreset_mode=mode, max_episode_steps=2), bumpy, 0.9
+    )
+    envs.reset(seed=0)
+    for _ in range(2):
+        truncated = envs.step(np.zeros((3, 3)))[3]
+    assert truncated.all()
+    before, _ = envs.reset(seed=1)
+    after, _, _, _, info = envs.step(np.ones((3, 3)))
+    np.testing.assert_array_equal(info["shaping"], 0.9 * bumpy(after) - bumpy(before))

@@ -187,3 +187,11 @@ def test_the_same_wrapper_on_single_environments_and_their_vector_is_refused():
     envs.reset(seed=0)
     with pytest.raises(ValueError, match=r"can't tell 'action_square' .* has it already"):
         envs.step(np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_a_vector_that_names_no_autoreset_mode_is_refused(name):
+    envs = make_vec(2)
+    envs.metadata = {}
+    with pytest.raises(ValueError, match=r'metadata\["autoreset_mode"\] must be .* got None'):
+        wrapped(envs, [name], wrappers.vector)
