@@ -9,6 +9,7 @@ from physics import Fidelity
 from physics.validation import choice, instance
 from rigid_envs import scene_view
 from rigid_envs.rendering import Renderer
+from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
 from rigid_envs.tasks import Task
 
@@ -109,6 +110,11 @@ class RigidEnv(gym.Env[Observation, Array]):
             bool(step.truncated[0]),
             _first_info(step.info),
         )
+
+    @property
+    def reward(self) -> Reward:
+        """How goals and raw terms make the reward; wrappers ask it when goals agree."""
+        return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""

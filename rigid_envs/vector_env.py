@@ -12,6 +12,7 @@ from physics.validation import choice, integer
 from rigid_envs import scene_view
 from rigid_envs.env import RENDER_MODES
 from rigid_envs.rendering import Renderer
+from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
 from rigid_envs.tasks import Task
 
@@ -175,6 +176,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             "final_info": final_info,
             "_final_info": ended,
         }
+
+    @property
+    def reward(self) -> Reward:
+        """How goals and raw terms make the reward; wrappers ask it when goals agree."""
+        return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""

@@ -1,0 +1,79 @@
+"""Learners see the rewards of wrapped environments, relabelled ones too."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3 import SAC
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.her import HerReplayBuffer
+
+from rigid_envs import wrappers
+from rigid_envs.wrappers import Stage, goal_potential
+from training.environments import make_vector_env
+from training.vec_env import RigidVecEnv
+
+PUSH = "RigidEnvs/Push-v0"
+WORLDS = 4
+EPISODE = 50
+
+
+def her(env, **buffer):
+    return SAC(
+        "MultiInputPolicy",
+        env,
+        replay_buffer_class=HerReplayBuffer,
+        replay_buffer_kwargs={"n_sampled_goal": 4, **buffer},
+        learning_starts=EPISODE * env.num_envs,
+        buffer_size=2000,
+        batch_size=32,
+        policy_kwargs={"net_arch": [16]},
+        seed=0,
+    )
+
+
+def test_hindsight_relabels_with_the_wrapped_reward():
+    envs = wrappers.vector.SuccessBonus(make_vector_env(PUSH, WORLDS), 5.0)
+    envs = wrappers.vector.ScaleReward(wrappers.vector.TimePenalty(envs, 0.5), 2.0)
+    model = her(VecMonitor(RigidVecEnv(envs)))
+    model.learn(EPISODE * WORLDS + 20)
+    rewards = model.replay_buffer.sample(64).rewards.numpy()
+    assert set(np.unique(rewards)) == {-3.0, 10.0}
+
+
+def test_hindsight_is_told_why_a_reward_can_not_be_relabelled():
+    envs = wrappers.vector.PotentialShaping(make_vector_env(PUSH, WORLDS), goal_potential, 0.98)
+    model = her(VecMonitor(RigidVecEnv(envs)))
+    with pytest.raises(ValueError, match=r"PotentialShaping.* HER .*leave PotentialShaping out"):
+        model.learn(EPISODE * WORLDS + 20)
+
+
+def test_hindsight_that_keeps_infos_relabels_costs_of_actions():
+    env = make_vec_env(PUSH, 2, wrapper_class=wrappers.ActionPenalty, wrapper_kwargs={"weight": 1})
+    model = her(env, copy_info_dict=True)
+    model.learn(EPISODE * 2 + 20)
+    sample = model.replay_buffer.sample(64)
+    charged = (sample.actions.numpy() ** 2).sum(axis=1, keepdims=True)
+    sparse = sample.rewards.numpy() + charged
+    np.testing.assert_allclose(sparse, np.round(sparse), atol=1e-5)
+    assert set(np.unique(np.round(sparse))) == {-1.0, 0.0}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("StagedReward", {"stages": [Stage("reach", -0.4, -0.03), Stage("success", 0, 1)]}),
+        ("PotentialShaping", {"potential": goal_potential, "gamma": 0.98}),
+        ("ActionPenalty", {"weight": 0.1}),
+        ("SmoothnessPenalty", {"weight": 0.1}),
+        ("SuccessBonus", {"bonus": 1.0}),
+        ("TimePenalty", {"penalty": 1.0}),
+        ("ScaleReward", {"scale": 0.1}),
+        ("ClipReward", {"low": -0.5, "high": 0.0}),
+    ],
+)
+@pytest.mark.parametrize("kind", ["sparse", "dense"])
+def test_stable_baselines3s_checker_finds_nothing(name, arguments, kind):
+    check_env(getattr(wrappers, name)(gym.make(PUSH, reward_type=kind), **arguments))
