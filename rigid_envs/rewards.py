@@ -12,7 +12,7 @@ Array = np.ndarray
 
 REWARD_TYPES = ("sparse", "dense")
 # terms that follow from the goals
-OF_GOALS = ("success", "distance")
+OF_GOALS = ("success", "distance", "time")
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,8 @@ class Reward:
     """Sparse and dense reward of a goal-conditioned task.
 
     Sparse: 0 where the goals are within the threshold, else -1.
-    Dense: the sum of weight times raw term. Two terms follow from the goals: "success", 1 where
-    solved, and "distance", m apart with a minus; the others are the task's.
+    Dense: the sum of weight times raw term. Three terms follow from the goals: "success", 1 where
+    solved, "distance", m apart with a minus, and "time", always 1; the others are the task's.
 
     Args:
         threshold: m, largest distance that counts as solved.
@@ -41,7 +41,7 @@ class Reward:
 
     def dense(self, success: Any, apart: Any, terms: Mapping[str, Array]) -> Any:
         """The shaped reward, [...]."""
-        known = {"success": success, "distance": -apart}
+        known = {"success": success, "distance": -apart, "time": 1.0}
         reward = np.zeros_like(apart)
         for name, weight in self.weights.items():
             reward = reward + weight * (known[name] if name in known else terms[name])

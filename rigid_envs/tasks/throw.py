@@ -37,7 +37,7 @@ class Throw(Task):
 
     def scene(self) -> Scene:
         """A ball between the pads of a hand above the ground."""
-        material = Material(friction=0.5, restitution=0.3, rolling_resistance=0.002)
+        material = Material(friction=0.5, restitution=0.3)
         pads = Material(friction=2.0, restitution=0.0)
         ball = Body(Sphere(RADIUS), mass=MASS, position=self.hand.home, material=material)
         hand = self.hand.gripper(2.0 * RADIUS, pads)

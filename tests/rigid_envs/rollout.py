@@ -9,8 +9,8 @@ from gymnasium.vector import VectorEnv
 
 import rigid_envs  # noqa: F401  (registers the ids)
 
-PUSH = "RigidEnvs/Push-v0"
-IDS = [PUSH]
+PUSH, STACK, THROW = (f"RigidEnvs/{task}-v0" for task in ("Push", "Stack", "Throw"))
+IDS = [PUSH, STACK, THROW]
 PRESETS = ["fast", "balanced", "accurate", "solid"]
 REWARDS = ["sparse", "dense"]
 EPISODE = 50
@@ -25,11 +25,11 @@ def make_vec(num_envs: int, env_id: str = PUSH, **kwargs: Any) -> VectorEnv:
     return gym.make_vec(env_id, num_envs=num_envs, **kwargs)
 
 
-def random_actions(steps: int, worlds: int, seed: int = 0) -> np.ndarray:
-    """[steps, worlds, 3]; the odd worlds hold full actions for ten steps, the others draw anew."""
+def random_actions(steps: int, worlds: int, seed: int = 0, size: int = 3) -> np.ndarray:
+    """[steps, worlds, size]; odd worlds hold full actions for ten steps, the others draw anew."""
     random = np.random.default_rng(seed)
-    actions = random.uniform(-1.0, 1.0, (steps, worlds, 3))
-    full = np.sign(random.uniform(-1.0, 1.0, (-(-steps // 10), worlds, 3))).repeat(10, axis=0)
+    actions = random.uniform(-1.0, 1.0, (steps, worlds, size))
+    full = np.sign(random.uniform(-1.0, 1.0, (-(-steps // 10), worlds, size))).repeat(10, axis=0)
     actions[:, 1::2] = full[:steps, 1::2]
     return actions.astype(np.float32)
 

@@ -1,0 +1,141 @@
+"""Stack is a fair task: nothing is solved by chance, and its physics allows it to be solved."""
+
+import numpy as np
+import pytest
+
+from rigid_envs.rewards import distance
+from rigid_envs.tasks.stack import CELL, HALF, JITTER, THRESHOLD, Stack
+from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
+from training.scripted import CONTROLLERS
+
+EPISODE = 100
+BLOCKS = (2, 3, 5)
+
+
+def cubes_of(goal: np.ndarray) -> np.ndarray:
+    """[n, blocks, 3] of a goal [n, 3 blocks + 1]."""
+    return goal[:, :-1].reshape(len(goal), -1, 3)
+
+
+@pytest.mark.parametrize("blocks", BLOCKS)
+def test_no_episode_starts_solved_and_cubes_have_room(blocks):
+    observation, info = make_vec(2000, STACK, blocks=blocks).reset(seed=0)
+    assert not info["is_success"].any()
+    cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))
+    places = np.concatenate([cubes, tower[:, :1]], axis=1)[..., :2]
+    for i in range(blocks + 1):
+        for j in range(i):
+            apart = np.abs(places[:, i] - places[:, j]).max(axis=1)
+            assert apart.min() >= CELL - 2.0 * JITTER - 1e-6  # wide enough for fingers between
+    np.testing.assert_allclose(np.abs(places).max(), CELL + JITTER, atol=1e-3)
+
+
+def test_the_goal_is_a_tower_that_nothing_holds():
+    observation, _ = make_vec(10, STACK, blocks=4).reset(seed=0)
+    tower = cubes_of(observation["desired_goal"])
+    np.testing.assert_allclose(tower[:, :, 2], np.tile(HALF * np.array([1, 3, 5, 7]), (10, 1)))
+    np.testing.assert_array_equal(tower[:, :, :2], np.repeat(tower[:, :1, :2], 4, axis=1))
+    np.testing.assert_array_equal(observation["desired_goal"][:, -1], 1.0)
+
+
+def test_a_tower_is_solved_only_when_let_go():
+    env = make(STACK, reward_type="dense")
+    env.reset(seed=0)
+    world, tower = env._runner.world, cubes_of(env._runner.goals)
+    place = tower[0, 1].astype(float)
+    fingers = np.array([place + [0.0, side * (HALF + 0.02), 0.0] for side in (-1, 1)])
+    world.set_state(position=tower.astype(float), drive_position=fingers[None])
+    env._runner._now = world.read()
+    hold, release = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
+    for _ in range(5):
+        observation, gripped, _, _, info = env.step(hold)
+    assert info["placed"] == 2.0
+    assert not info["is_success"]
+    assert observation["achieved_goal"][-1] == 0.0
+    for _ in range(5):
+        observation, reward, _, _, info = env.step(release)
+    assert info["is_success"]
+    assert reward == pytest.approx(0.0)
+    assert gripped < reward
+
+
+def test_the_observation_is_what_its_bounds_name():
+    envs = make_vec(20, STACK)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    for observation, *_ in steps_of(envs, random_actions(40, 20, size=4)):
+        values = observation["observation"].T
+        seen = dict(zip([b[0] for b in Stack().bounds], values, strict=True))
+        fingers = world.drive_position
+        for i, axis in enumerate("xyz"):
+            hand = fingers[:, :, i].mean(axis=1)
+            np.testing.assert_allclose(seen[f"hand {axis}"], hand, atol=1e-6)
+            reference = world.drive_reference[:, :, i].mean(axis=1)
+            np.testing.assert_allclose(seen[f"hand reference {axis}"], reference, atol=1e-6)
+            for cube in (0, 1):
+                place = world.position[:, cube, i]
+                np.testing.assert_allclose(seen[f"cube {cube} {axis}"], place, atol=1e-6)
+                np.testing.assert_allclose(
+                    seen[f"hand to cube {cube} {axis}"], place - hand, atol=1e-6
+                )
+        gap = fingers[:, 1, 1] - fingers[:, 0, 1] - 0.03
+        np.testing.assert_allclose(seen["opening"], gap, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "message"), [(1, "at least 2"), (6, "at most 5"), (2.5, "blocks"), ("two", "blocks")]
+)
+def test_a_wrong_number_of_blocks_is_named(blocks, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        make(STACK, blocks=blocks)
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_blind_steps_stay_physical(fidelity, stress):
+    """50,000 random and bang-bang actions, and a million under stress."""
+    worlds = 256
+    envs = make_vec(worlds, STACK, fidelity=fidelity)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    actions = random_actions(4000 if stress else 200, worlds, size=4)
+    for observation, *_, info in steps_of(envs, actions):
+        inside = ~info["out_of_bounds"]
+        assert all(np.isfinite(values).all() for values in observation.values())
+        # a hand of 14 N presses a cube in, and pads at 1.6 m/s push it out: no more than that
+        assert world.kinetic_energy()[inside].max() < 2.0
+        assert world.position[inside][..., 2].min() > 0.0
+        assert world.drive_position[inside][..., 2].min() > 0.0
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_random_policy_hardly_ever_solves_it(fidelity):
+    envs = make_vec(200, STACK, fidelity=fidelity)
+    envs.reset(seed=0)
+    solved = np.zeros(200, dtype=bool)
+    for *_, info in steps_of(envs, np.random.default_rng(0).uniform(-1, 1, (EPISODE, 200, 4))):
+        solved |= info["is_success"]
+    assert solved.mean() < 0.02
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_scripted_controller_builds_a_tower_of_two(fidelity, stress):
+    """1,000 seeds at balanced, and under stress at all presets."""
+    worlds = 1000 if stress or fidelity == "balanced" else 200
+    assert solved(fidelity, worlds, 2).mean() >= 0.98
+
+
+@pytest.mark.parametrize("fidelity", ["balanced", "solid"])
+def test_a_scripted_controller_builds_a_tower_of_three(fidelity, stress):
+    assert solved(fidelity, 1000 if stress else 200, 3).mean() >= 0.9
+
+
+def solved(fidelity: str, worlds: int, blocks: int) -> np.ndarray:
+    """Which [worlds] the controller leaves solved."""
+    envs = make_vec(worlds, STACK, fidelity=fidelity, blocks=blocks)
+    observation, _ = envs.reset(seed=0)
+    for _ in range(EPISODE):
+        observation, _, _, truncated, info = envs.step(CONTROLLERS[STACK](observation))
+    assert truncated.all()
+    apart = distance(observation["achieved_goal"], observation["desired_goal"])
+    np.testing.assert_array_equal(info["is_success"], apart <= THRESHOLD)
+    return info["is_success"]

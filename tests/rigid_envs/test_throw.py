@@ -1,0 +1,121 @@
+"""Throw is a fair task: nothing is solved by chance, and its physics allows it to be solved."""
+
+import numpy as np
+import pytest
+
+from rigid_envs.tasks.throw import ASIDE, FARTHEST, GRAVITY, NEAREST, RADIUS, Throw
+from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, random_actions, steps_of
+from training.scripted import CONTROLLERS
+
+EPISODE = 50
+HOLD, DROP = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
+# s, of the presets' substeps
+STEPS = {"fast": 4e-3, "balanced": 2e-3, "accurate": 0.25e-3, "solid": 2e-3}
+
+
+def test_targets_are_out_of_reach_and_none_is_solved_at_the_start():
+    observation, info = make_vec(5000, THROW).reset(seed=0)
+    assert not info["is_success"].any()
+    goal = observation["desired_goal"].astype(float)
+    far = np.hypot(goal[:, 0], goal[:, 1])
+    assert NEAREST - 1e-6 <= far.min() < NEAREST + 0.01
+    assert FARTHEST - 0.01 < far.max() <= FARTHEST + 1e-6
+    assert np.abs(np.arctan2(goal[:, 1], goal[:, 0])).max() <= ASIDE + 1e-6
+    assert far.min() > np.hypot(*Throw.hand.high[:2]) + 0.1
+    # as many in the outer half of the area as in the inner one
+    middle = np.sqrt(0.5 * (NEAREST**2 + FARTHEST**2))
+    assert abs((far > middle).mean() - 0.5) < 0.03
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_ball_that_is_held_stays_and_does_not_creep(fidelity):
+    envs = make_vec(1, THROW, fidelity=fidelity, max_episode_steps=None)
+    envs.reset(seed=0)
+    places = []
+    for observation, *_, info in steps_of(envs, np.tile(HOLD, (300, 1, 1))):
+        places.append(observation["observation"][0, 17:20].astype(float))
+        assert not info["landed"].any()
+    assert np.abs(places[0]).max() < 0.01
+    assert np.abs(places[-1] - places[50]).max() < 1e-4  # 10 s
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_the_first_touch_counts_and_not_where_the_ball_rolls(fidelity):
+    envs = make_vec(8, THROW, fidelity=fidelity, max_episode_steps=None)
+    envs.reset(seed=0)
+    swing = np.tile([0.3, 0.1, 0.0, -1.0], (5, 8, 1))
+    letting_go = np.tile([0.3, 0.1, 0.0, 1.0], (2, 8, 1))
+    waiting = np.tile(DROP, (30, 8, 1))
+    flight = landed = None
+    for observation, *_, info in steps_of(envs, np.concatenate([swing, letting_go, waiting])):
+        now = observation["achieved_goal"].astype(float)
+        if not info["landed"].any():
+            ball = observation["observation"][:, 11:17].astype(float)
+            flight = ball[:, :3], ball[:, 3:]
+        elif landed is None:
+            landed = now
+        else:
+            np.testing.assert_array_equal(now, landed)
+    # closed form from the last frame in free flight, to the substep in which it touched
+    place, speed = flight
+    rise = speed[:, 2]
+    time = (rise + np.sqrt(rise**2 + 2.0 * GRAVITY * (place[:, 2] - RADIUS))) / GRAVITY
+    expected = place[:, :2] + time[:, None] * speed[:, :2]
+    fastest = np.linalg.norm(speed[:, :2], axis=1).max()
+    assert fastest > 0.5
+    assert np.abs(landed[:, :2] - expected).max() < 1.5 * STEPS[fidelity] * fastest
+    ball = envs._runner.world.position[:, 0]
+    assert np.linalg.norm(ball - landed, axis=1).min() > 0.02  # it rolled on
+
+
+def test_aim_is_the_miss_of_a_ball_let_go_now():
+    envs = make_vec(16, THROW, reward_type="dense", max_episode_steps=None)
+    observation, info = envs.reset(seed=3)
+    free = np.zeros(16, dtype=bool)
+    for _ in range(EPISODE):
+        before = info["aim"]
+        observation, _, _, _, info = envs.step(CONTROLLERS[THROW](observation))
+        # flight changes nothing of where it lands
+        np.testing.assert_allclose(info["aim"][free], before[free], atol=0.01)
+        ball, hand = observation["observation"][:, 11:14], observation["observation"][:, :3]
+        free = np.linalg.norm(ball - hand, axis=1) > 0.1
+    apart = np.linalg.norm(observation["achieved_goal"] - observation["desired_goal"], axis=1)
+    np.testing.assert_allclose(-info["aim"], apart, atol=0.01)
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_blind_steps_stay_physical(fidelity, stress):
+    """100,000 random and bang-bang actions, and a million under stress."""
+    envs = make_vec(512, THROW, fidelity=fidelity)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    for observation, *_, info in steps_of(
+        envs, random_actions(2000 if stress else 200, 512, size=4)
+    ):
+        inside = ~info["out_of_bounds"]
+        assert all(np.isfinite(values).all() for values in observation.values())
+        # a hand reaches 4 m/s, and squeezes a ball out at no more than as much again
+        assert world.kinetic_energy()[inside].max() < 0.5 * 0.05 * 8.0**2
+        assert world.position[inside][..., 2].min() > 0.0
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_random_policy_hardly_ever_solves_it(fidelity):
+    envs = make_vec(500, THROW, fidelity=fidelity)
+    envs.reset(seed=0)
+    solved = np.zeros(500, dtype=bool)
+    for *_, info in steps_of(envs, np.random.default_rng(0).uniform(-1, 1, (EPISODE, 500, 4))):
+        solved |= info["is_success"]
+    assert solved.mean() < 0.02
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+def test_a_scripted_controller_hits(fidelity, stress):
+    """1,000 seeds, and 200 at accurate but under stress."""
+    worlds = 200 if fidelity == "accurate" and not stress else 1000
+    envs = make_vec(worlds, THROW, fidelity=fidelity)
+    observation, _ = envs.reset(seed=0)
+    for _ in range(EPISODE):
+        observation, _, _, truncated, info = envs.step(CONTROLLERS[THROW](observation))
+    assert truncated.all()
+    assert info["is_success"].mean() >= 0.95
