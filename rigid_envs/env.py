@@ -22,7 +22,7 @@ class RigidEnv(gym.Env[Observation, Array]):
     """A task in one world.
 
     Args:
-        task: a task's name, or a task.
+        task: a task's name or class, or a task.
         reward_type: "sparse": -1 or 0; "dense": shaped.
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" or "human".
@@ -36,7 +36,7 @@ class RigidEnv(gym.Env[Observation, Array]):
 
     def __init__(
         self,
-        task: str | Task = "push",
+        task: str | type[Task] | Task = "push",
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",
         render_mode: str | None = None,

@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,19 +44,19 @@ class Runner:
     """Episodes of a task in `count` worlds.
 
     Args:
-        task: a task's name, or a task.
+        task: a task's name or class, or a task.
         count: number of worlds.
         reward_type: "sparse" or "dense".
         fidelity: of the physics.
         threads: to share the worlds out over; all cores if None.
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
-        **arguments: of the task, where it is given by its name.
+        **arguments: of the task, where it is given by its name or class.
     """
 
     def __init__(
         self,
-        task: str | Task,
+        task: str | type[Task] | Task,
         count: int,
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",
@@ -240,17 +241,21 @@ class Runner:
 
 
 def _make_task(task: Any, arguments: dict[str, Any]) -> Task:
-    """A task from its name and arguments, or the task itself."""
-    if isinstance(task, Task):
-        known: list[str] = []
-    else:
-        kind = TASKS[choice("task", task, TASKS)]
-        known = [p for p in inspect.signature(kind).parameters if p != "self"]
-    for name in arguments:
-        if name not in known:
-            of_task = f"task {task!r} knows {known}" if known else f"task {task!r} knows none"
-            raise TypeError(f"unknown argument {name!r}: of its own, {of_task}")
-    return task if isinstance(task, Task) else kind(**arguments)
+    """A task from its name or class, and arguments; or the task itself."""
+    known: list[str] = []
+    if not isinstance(task, Task):
+        if not (isinstance(task, type) and issubclass(task, Task)):
+            task = TASKS[choice("task", task, TASKS)]
+        known = list(inspect.signature(task).parameters)
+    name = (task if isinstance(task, type) else type(task)).__name__
+    for argument in arguments:
+        if argument not in known:
+            near = get_close_matches(argument, known, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise TypeError(
+                f"unknown argument {argument!r}: of its own, {name} has {known or 'none'}{hint}"
+            )
+    return task if isinstance(task, Task) else task(**arguments)
 
 
 def check_seed(field: str, value: Any) -> int:

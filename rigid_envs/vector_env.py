@@ -25,7 +25,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     World i of reset(seed=s) behaves as the single environment reset with s + i, bit for bit.
 
     Args:
-        task: a task's name, or a task.
+        task: a task's name or class, or a task.
         num_envs: number of worlds.
         reward_type: "sparse": -1 or 0; "dense": shaped.
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
@@ -45,7 +45,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
 
     def __init__(
         self,
-        task: str | Task = "push",
+        task: str | type[Task] | Task = "push",
         num_envs: int = 1,
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",

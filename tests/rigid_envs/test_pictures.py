@@ -32,7 +32,7 @@ def test_a_picture_follows_the_world(env_id):
     env.reset(seed=0)
     before = env.render()
     np.testing.assert_array_equal(env.render(), before)
-    env.step(np.ones(3))
+    env.step(env.action_space.high)
     after = env.render()
     assert after.shape == FRAME
     assert after.dtype == np.uint8

@@ -43,7 +43,7 @@ def test_a_tower_is_solved_only_when_let_go():
     env.reset(seed=0)
     world, tower = env._runner.world, cubes_of(env._runner.goals)
     place = tower[0, 1].astype(float)
-    fingers = np.array([place + [0.0, side * (HALF + 0.02), 0.0] for side in (-1, 1)])
+    fingers = place + np.array([[0.0, side * (HALF + 0.02), 0.0] for side in (-1, 1)])
     world.set_state(position=tower.astype(float), drive_position=fingers[None])
     env._runner._now = world.read()
     hold, release = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
