@@ -13,6 +13,7 @@ from physics.validation import number, positive, vector
 Array = np.ndarray
 
 NEAR = 0.1  # least depth that is drawn, as a share of the camera's distance
+_DOWN = np.array([1.0, -1.0])  # rows of a picture count downwards
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class Camera:
         Returns:
             Pixels [..., 2], right and down from the top left corner, and depths [...] m.
         """
-        right, up, depth = np.moveaxis((points - self.eye) @ self.axes.T, -1, 0)
+        local = (points - self.eye) @ self.axes.T
+        depth = local[..., 2]
         scale = self.focal_length(height) / np.maximum(depth, self.near)
-        return np.stack([0.5 * width + scale * right, 0.5 * height - scale * up], -1), depth
+        pixels = local[..., :2] * (scale[..., None] * _DOWN)
+        return pixels + np.array([0.5 * width, 0.5 * height]), depth

@@ -1,5 +1,6 @@
 """Painter: solids as polygons and pictures of balls, on a canvas that a camera looks at."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -10,17 +11,18 @@ from rigid_envs.solids import FACES, Solids, box_corners
 from rigid_envs.view import Color, Ghost, Particles, shade
 
 Array = np.ndarray
-Face = tuple[int, int, list[int]]  # axis, side and corners, see FACES
+Points = list[list[int]]  # [n, 2] pixels
 
 GLOSS = 0.4  # strength of the highlight on round solids
 CAPSULE_STRIPS = 32  # flat strips that make up the visible half of a tube
 BALL_SIZE = 128  # pixels of the picture that all balls of a colour are scaled from
-GHOST_FILL, GHOST_EDGE, FAINT_FILL, FAINT_EDGE = 70, 200, 60, 110  # opacity of 255
+GHOST_FILL, FAINT_FILL, FAINT_EDGE = 70, 60, 110  # opacity of 255
+EDGE = 0.72  # brightness of a box's edges, as a share of its faces'
 LEAST_PARTICLE = 2.0  # pixels of a finished picture, radius; smaller ones would not be seen
 
 
 class Painter:
-    """Draws one solid after the other.
+    """Draws on a canvas.
 
     Args:
         pygame: the module.
@@ -40,73 +42,88 @@ class Painter:
         """Pixels and depths of points, see `Camera.project`."""
         return self._camera.project(points, *self._canvas.get_size())
 
-    def polygon(self, color: Any, pixels: Array, width: int = 0) -> None:
+    def polygon(self, color: Any, points: Points, width: int = 0) -> None:
         """A filled polygon, or its outline."""
-        points = np.rint(pixels).astype(int).tolist()
-        self._pygame.draw.polygon(self._canvas, tuple(map(int, color)), points, width)
+        self._pygame.draw.polygon(self._canvas, color, points, width)
 
-    def glass(self, color: Color, parts: list[Array], fill: int, edge: int) -> None:
-        """Translucent polygons of one colour with stronger edges; each an array [n, 2] of pixels.
+    def glass(self, color: Color, parts: Sequence[Points], fill: int, edge: int = 0) -> None:
+        """Translucent polygons with stronger edges, of one colour and opacities up to 255.
 
-        Parts add up where they overlap only in their edges.
+        Where they overlap they do not add up.
         """
-        low = np.floor(np.min([p.min(axis=0) for p in parts], axis=0)) - self._fineness
-        high = np.ceil(np.max([p.max(axis=0) for p in parts], axis=0)) + self._fineness + 1
-        low = np.maximum(low, 0.0)
-        size = (np.minimum(high, self._canvas.get_size()) - low).astype(int)
-        if (size <= 0).any():
+        columns, rows = zip(*(point for part in parts for point in part), strict=True)
+        margin = self._fineness
+        left, top = max(min(columns) - margin, 0), max(min(rows) - margin, 0)
+        width = min(max(columns) + margin + 1, self._canvas.get_width()) - left
+        height = min(max(rows) + margin + 1, self._canvas.get_height()) - top
+        if width <= 0 or height <= 0:
             return
-        layer = self._pygame.Surface(size.tolist(), self._pygame.SRCALPHA)
-        rounded = [np.rint(p - low).astype(int).tolist() for p in parts]
-        if fill:
-            for points in rounded:
-                self._pygame.draw.polygon(layer, (*color, fill), points)
-        if edge:
-            for points in rounded:
-                self._pygame.draw.polygon(layer, (*color, edge), points, self._fineness)
-        self._canvas.blit(layer, low.astype(int).tolist())
+        layer = self._pygame.Surface((width, height), self._pygame.SRCALPHA)
+        moved = [[(x - left, y - top) for x, y in part] for part in parts]
+        for part in moved:
+            self._pygame.draw.polygon(layer, (*color, fill), part)
+        for part in moved if edge else ():
+            self._pygame.draw.polygon(layer, (*color, edge), part, self._fineness)
+        self._canvas.blit(layer, (left, top))
 
-    def solid(
-        self, solids: Solids, i: int, color: Color, particles: Particles | None, *, glass: bool
+    def draw_solids(
+        self, solids: Solids, colors: Sequence[Color], particles: Sequence[Particles | None]
     ) -> None:
-        """Solid i; as glass if it is the ball of a goal."""
-        pixels, depth = self.project(solids.corners[i])
-        if depth.min() - solids.radius[i] < self._camera.near:
-            return
-        if particles is not None:
-            if not solids.radius[i]:
-                faces = [pixels[corners] for _, _, corners in self._faces(solids, i)]
-                self.glass(color, faces, FAINT_FILL, FAINT_EDGE)
-            self._draw_particles(solids, i, color, particles)
-        elif not solids.radius[i]:
-            self._draw_box(solids, i, pixels, color)
-        elif solids.half[i].any():
-            self._draw_capsule(solids, i, color)
-        else:
-            self._draw_ball(solids.centre[i], solids.radius[i], color, glass=glass)
+        """Every solid, the farther ones first; those beyond the particles are balls of goals."""
+        pixels, depth = self.project(solids.corners)
+        nearest = depth.min(axis=1, initial=np.inf) - solids.radius
+        corners, seen = whole(pixels), self._seen(solids.centre, solids.axes, solids.half)
+        paints = self._paints(solids, colors)
+        edges = (EDGE * paints).astype(int).tolist()
+        faces = paints.astype(int).tolist()
+        for i in solids.paint_order(self._camera.eye):
+            if nearest[i] < self._camera.near:
+                continue
+            balls = particles[i] if i < len(particles) else None
+            if solids.radius[i] == 0.0:
+                parts = {face: [corners[i][k] for k in FACES[face][2]] for face in seen[i]}
+                if balls is not None:
+                    self.glass(colors[i], list(parts.values()), FAINT_FILL, FAINT_EDGE)
+                else:
+                    for face, part in parts.items():
+                        self.polygon(faces[i][face], part)
+                        self.polygon(edges[i][face], part, self._fineness)
+            if balls is not None:
+                self._draw_particles(solids, i, colors[i], balls)
+            elif solids.radius[i] and solids.half[i].any():
+                self._draw_capsule(solids, i, colors[i])
+            elif solids.radius[i]:
+                glass = i >= len(particles)
+                self._draw_ball(solids.centre[i], solids.radius[i], colors[i], glass=glass)
 
-    def ghost(self, ghost: Ghost, *, edges: bool) -> None:
-        """The faces or the edges of a place for a box."""
-        corners = box_corners(ghost.position, np.eye(3), ghost.half_extents)
-        pixels, depth = self.project(corners)
-        if depth.min() < self._camera.near:
-            return
-        faces = _seen(self._camera.eye - ghost.position, ghost.half_extents)
-        seen = [pixels[at] for _, _, at in faces]
-        if edges:
-            self.glass(ghost.color, seen, 0, GHOST_EDGE)
-        else:
-            self.glass(ghost.color, seen, GHOST_FILL, 0)
+    def ghosts(self, ghosts: Sequence[Ghost]) -> list[tuple[Color, list[Points]]]:
+        """Colour and visible faces of every ghost, those of the farther ones first."""
+        if not ghosts:
+            return []
+        centre = np.stack([ghost.position for ghost in ghosts])
+        half = np.stack([ghost.half_extents for ghost in ghosts])
+        axes = np.broadcast_to(np.eye(3), (len(ghosts), 3, 3))
+        pixels, depth = self.project(box_corners(centre, axes, half))
+        corners, seen = whole(pixels), self._seen(centre, axes, half)
+        order = np.argsort(-np.linalg.norm(centre - self._camera.eye, axis=1)).tolist()
+        return [
+            (ghosts[i].color, [[corners[i][k] for k in FACES[face][2]] for face in seen[i]])
+            for i in order
+            if depth[i].min() > self._camera.near and seen[i]
+        ]
 
-    def _faces(self, solids: Solids, i: int) -> list[Face]:
-        return _seen((self._camera.eye - solids.centre[i]) @ solids.axes[i], solids.half[i])
+    def _seen(self, centre: Array, axes: Array, half: Array) -> list[list[int]]:
+        """Which of the `FACES` of every box the camera sees."""
+        eye = np.einsum("ni,nij->nj", self._camera.eye - centre, axes)  # m, as the box sees it
+        beyond = [side * eye[:, axis] > half[:, axis] for axis, side, _ in FACES]
+        return [np.flatnonzero(row).tolist() for row in np.stack(beyond, axis=1)]
 
-    def _draw_box(self, solids: Solids, i: int, pixels: Array, color: Color) -> None:
-        for axis, side, corners in self._faces(solids, i):
-            normal = side * solids.axes[i, :, axis]
-            paint = shade(color, normal, -self._camera.axes[2], 0.0)
-            self.polygon(paint, pixels[corners])
-            self.polygon(0.72 * paint, pixels[corners], self._fineness)
+    def _paints(self, solids: Solids, colors: Sequence[Color]) -> Array:
+        """Colours [n, 6, 3] of the `FACES` of every solid."""
+        turn = solids.axes.swapaxes(1, 2)
+        normals = np.stack([side * turn[:, axis] for axis, side, _ in FACES], axis=1)
+        own = np.array(colors, dtype=float).reshape(-1, 1, 3)
+        return shade(own, normals, -self._camera.axes[2], 0.0)
 
     def _draw_particles(self, solids: Solids, i: int, color: Color, particles: Particles) -> None:
         """All balls from far to near; they have one size, so that no other order is needed."""
@@ -158,10 +175,12 @@ class Painter:
         normals = np.sin(turn) * side + np.cos(turn) * np.cross(side, axis)
         pixels, _ = self.project(ends[:, None] + radius * normals[::2])
         paints = shade(color, normals[1::2], -self._camera.axes[2], GLOSS)
-        for k, paint in enumerate(paints):
-            self.polygon(paint, pixels[[0, 0, 1, 1], [k, k + 1, k + 1, k]])
+        points, colors = whole(pixels), paints.astype(int).tolist()
+        near, far = points
+        for k, paint in enumerate(colors):
+            self.polygon(paint, [near[k], near[k + 1], far[k + 1], far[k]])
 
 
-def _seen(eye: Array, half: Array) -> list[Face]:
-    """The faces of a box that are seen from `eye` [3] m in its frame."""
-    return [face for face in FACES if face[1] * eye[face[0]] > half[face[0]]]
+def whole(pixels: Array) -> Any:
+    """Pixels as nested lists of integers, as pygame takes them."""
+    return np.rint(pixels).astype(int).tolist()

@@ -11,7 +11,7 @@ import numpy as np
 
 from physics.validation import integer
 from rigid_envs.camera import Camera
-from rigid_envs.painter import Painter
+from rigid_envs.painter import GHOST_FILL, Painter, whole
 from rigid_envs.solids import ACROSS_LIGHT, CIRCLE, LIGHTS, SHADOW_SAMPLES, Solids
 from rigid_envs.view import TO_LIGHT, Arrow, Ghost, Goal, Item, Mark, Particles, Sign, ground
 from rigid_envs.window import INK, load_pygame
@@ -58,9 +58,10 @@ class Renderer:
         self.camera = camera or Camera()
         self._pygame = pygame = load_pygame()
         size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
-        surfaces = [pygame.Surface(size, depth=32) for _ in range(4)]
-        self._background, self._canvas, self._shadow, self._layer = surfaces
-        self._picture = pygame.Surface((self.width, self.height), depth=32)
+        self._background, self._canvas = (pygame.Surface(size, depth=32) for _ in range(2))
+        size_of_picture = (self.width, self.height)
+        surfaces = [pygame.Surface(size_of_picture, depth=32) for _ in range(3)]
+        self._picture, self._shadow, self._layer = surfaces
         self._painter = Painter(pygame, self._canvas, self.camera, SUPERSAMPLING)
         pygame.surfarray.blit_array(self._background, ground(self.camera, *size))
         self._scale = self._words(SCALE, max(self.height // 30, 12))
@@ -90,10 +91,8 @@ class Renderer:
         """
         goals = [sign for sign in signs if isinstance(sign, Goal)]
         balls = [goal for goal in goals if goal.position[2] > 0.0]
-        ghosts = [sign for sign in signs if isinstance(sign, Ghost)]
-        ghosts.sort(key=lambda g: -float(np.linalg.norm(g.position - self.camera.eye)))
+        ghosts = self._painter.ghosts([sign for sign in signs if isinstance(sign, Ghost)])
         colors = [item.color for item in items] + [ball.color for ball in balls]
-        particles = [item.particles for item in items] + [None for _ in balls]
         solids = Solids(items, balls)
         self._canvas.blit(self._background, (0, 0))
         for goal in goals:
@@ -101,15 +100,14 @@ class Renderer:
         for sign in signs:
             if isinstance(sign, Mark):
                 self._draw_mark(sign)
-        self._draw_shadows(solids.outline(ACROSS_LIGHT)[: len(items)])
-        for ghost in ghosts:
-            self._painter.ghost(ghost, edges=False)
-        for i in solids.paint_order(self.camera.eye):
-            self._painter.solid(solids, i, colors[i], particles[i], glass=i >= len(items))
-        for ghost in ghosts:
-            self._painter.ghost(ghost, edges=True)
-        for arrow in forces:
-            self._draw_arrow(arrow)
+        self._draw_shadows(*solids.outlines(ACROSS_LIGHT, len(items)))
+        for color, faces in ghosts:
+            self._painter.glass(color, faces, GHOST_FILL)
+        self._painter.draw_solids(solids, colors, [item.particles for item in items])
+        for color, faces in ghosts:
+            for face in faces:
+                self._painter.polygon(color, face, SUPERSAMPLING)
+        self._draw_arrows(forces)
         self._pygame.transform.smoothscale(self._canvas, self._picture.get_size(), self._picture)
         self._write(self._words(caption, max(self.height // 22, 14)), top=True)
         self._write(self._scale, top=False)
@@ -128,7 +126,7 @@ class Renderer:
         pixels, depth = self._painter.project(around)
         if depth.min() < self.camera.near:
             return
-        self._painter.glass(goal.color, [pixels], DISC_FILL, DISC_EDGE)
+        self._painter.glass(goal.color, [whole(pixels)], DISC_FILL, DISC_EDGE)
         if goal.position[2] > goal.radius:  # a stem shows over which spot the ball hangs
             ends = self._painter.project(np.array([foot, goal.position]))[0].tolist()
             self._pygame.draw.line(self._canvas, goal.color, *ends, SUPERSAMPLING)
@@ -141,45 +139,62 @@ class Renderer:
             arm = [along + across, along - across, -along - across, -along + across]
             pixels, depth = self._painter.project(foot + np.array(arm))
             if depth.min() > self.camera.near:
-                self._painter.polygon(mark.color, pixels)
+                self._painter.polygon(mark.color, whole(pixels))
 
-    def _draw_shadows(self, outlines: Array) -> None:
-        """Darken the ground where solids hide the light; outlines [n, k, 3] m face the light.
+    def _draw_shadows(self, outlines: Array, ends: list[int]) -> None:
+        """Darken the ground where solids hide the light; outlines [m, 3] m face the light.
 
-        Each point of the light removes its share from the union of the shadows that it casts.
+        Each point of the light removes its share from the union of the shadows that it casts. They
+        are soft, so the size of the picture is fine enough.
         """
-        lights = LIGHTS[:, None, None]
-        cast = outlines - np.maximum(outlines[..., 2:], 0.0) * lights / lights[..., 2:]
+        lights = LIGHTS[:, None]
+        cast = outlines - np.maximum(outlines[:, 2:], 0.0) * lights / lights[..., 2:]
         cast[..., 2] = 0.0
         pixels, depth = self._painter.project(cast)
-        pixels = np.rint(pixels[:, (depth > self.camera.near).all(axis=(0, 2))]).astype(int)
-        if not pixels.size:
+        pixels = np.rint(pixels / SUPERSAMPLING).astype(int)
+        starts = [0, *ends[:-1]]
+        shown = [
+            slice(start, end)
+            for start, end in zip(starts, ends, strict=True)
+            if depth[:, start:end].min() > self.camera.near
+        ]
+        if not shown:
             return
-        low, high = pixels.min((0, 1, 2)), pixels.max((0, 1, 2))
-        area = self._pygame.Rect(low.tolist(), (high - low + 1).tolist())
-        area = area.clip(self._canvas.get_rect())
+        reach = np.concatenate([pixels[:, part] for part in shown], axis=1)
+        low, high = reach.min((0, 1)), reach.max((0, 1))
+        # one pixel more all around, for the way back to the canvas mixes neighbours
+        area = self._pygame.Rect((low - 1).tolist(), (high - low + 3).tolist())
+        area = area.clip(self._shadow.get_rect())
+        if not area:
+            return
         tint = np.rint(SHADOW_TINT / SHADOW_SAMPLES).astype(int).tolist()
         self._shadow.fill((255, 255, 255), area)
-        for shadows in pixels.tolist():
+        for points in pixels.tolist():
             self._layer.fill((0, 0, 0), area)
-            for shadow in shadows:
-                self._pygame.draw.polygon(self._layer, tint, shadow)
+            for part in shown:
+                self._pygame.draw.polygon(self._layer, tint, points[part])
             self._shadow.blit(self._layer, area, area, self._pygame.BLEND_RGB_SUB)
-        self._canvas.blit(self._shadow, area, area, self._pygame.BLEND_RGB_MULT)
+        size = (SUPERSAMPLING * area.width, SUPERSAMPLING * area.height)
+        fine = self._pygame.transform.smoothscale(self._shadow.subsurface(area), size)
+        place = (SUPERSAMPLING * area.left, SUPERSAMPLING * area.top)
+        self._canvas.blit(fine, place, special_flags=self._pygame.BLEND_RGB_MULT)
 
-    def _draw_arrow(self, arrow: Arrow) -> None:
-        (tail, tip), depth = self._painter.project(
-            np.array([arrow.origin, np.add(arrow.origin, arrow.vector)])
-        )
-        length = np.linalg.norm(tip - tail)
-        if length < 1.0 or depth.min() < self.camera.near:
+    def _draw_arrows(self, arrows: Sequence[Arrow]) -> None:
+        if not arrows:
             return
-        along = (tip - tail) / length
-        across = SUPERSAMPLING * np.array([-along[1], along[0]])
-        neck = tip - min(8.0 * SUPERSAMPLING, 0.6 * length) * along
-        left = [tail + across, neck + across, neck + 4.0 * across]
-        right = [neck - 4.0 * across, neck - across, tail - across]
-        self._painter.polygon(arrow.color, np.array([*left, tip, *right]))
+        origins = np.stack([arrow.origin for arrow in arrows])
+        ends = np.stack([origins, origins + np.stack([arrow.vector for arrow in arrows])], axis=1)
+        pixels, depth = self._painter.project(ends)
+        for arrow, (tail, tip), nearest in zip(arrows, pixels, depth.min(axis=1), strict=True):
+            length = float(np.hypot(*(tip - tail)))
+            if length < 1.0 or nearest < self.camera.near:
+                continue
+            along = (tip - tail) / length
+            across = SUPERSAMPLING * np.array([-along[1], along[0]])
+            neck = tip - min(8.0 * SUPERSAMPLING, 0.6 * length) * along
+            left = [tail + across, neck + across, neck + 4.0 * across]
+            right = [neck - 4.0 * across, neck - across, tail - across]
+            self._painter.polygon(arrow.color, whole(np.array([*left, tip, *right])))
 
     def _words(self, text: str, size: int) -> Any:
         font = self._pygame.font

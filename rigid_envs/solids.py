@@ -62,16 +62,26 @@ class Solids:
         self.radius[len(items) :] = [min(ball.radius, ball.position[2]) for ball in balls]
         self.corners = box_corners(self.centre, self.axes, self.half)
 
-    def outline(self, across: Array) -> Array:
-        """Silhouettes [n, 36, 3] m as seen along the normal of `across` [2, 3], two unit vectors.
+    def outlines(self, across: Array, count: int) -> tuple[Array, list[int]]:
+        """Silhouettes of the first solids as seen along the normal of `across` [2, 3].
 
-        Each point is the solid's furthest one in a direction of the plane; a box has as many
-        different ones as its silhouette has corners.
+        Each point is the solid's furthest one in a direction of the plane, and stands once, so that
+        a box has as many as its silhouette has corners.
+
+        Args:
+            across: two unit vectors.
+            count: how many solids.
+
+        Returns:
+            Points [m, 3] m of all silhouettes in turn, and where each ends in them.
         """
+        axes, half, radius = self.axes[:count], self.half[:count], self.radius[:count]
         ways = CIRCLE @ across
-        signs = np.sign(np.einsum("kj,nji->nki", ways, self.axes))
-        core = np.einsum("nij,nkj,nj->nki", self.axes, signs, self.half)
-        return self.centre[:, None] + core + self.radius[:, None, None] * ways
+        signs = np.sign(np.einsum("kj,nji->nki", ways, axes))
+        core = np.einsum("nij,nkj,nj->nki", axes, signs, half)
+        points = self.centre[:count, None] + core + radius[:, None, None] * ways
+        kept = (signs != np.roll(signs, 1, axis=1)).any(axis=2) | (radius > 0.0)[:, None]
+        return points[kept], np.cumsum(kept.sum(axis=1)).tolist()
 
     def in_front(self, pairs: Array, eye: Array) -> Array:
         """Whether the first of each of the `pairs` [k, 2] can hide the second from `eye` [3] m.

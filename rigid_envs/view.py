@@ -131,7 +131,7 @@ class Arrow:
         object.__setattr__(self, "vector", np.array(vector("Arrow.vector", self.vector)))
 
 
-def shade(color: Color, normals: Array, to_eye: Array, gloss: float) -> Array:
+def shade(color: Color | Array, normals: Array, to_eye: Array, gloss: float) -> Array:
     """Colours [..., 3] of surfaces with unit `normals` [..., 3]: sky, sun (Lambert), highlight."""
     light = 0.60 + 0.12 * normals[..., 2:] + 0.44 * np.maximum(normals @ TO_LIGHT[:, None], 0.0)
     halfway = (TO_LIGHT + to_eye) / np.linalg.norm(TO_LIGHT + to_eye)
