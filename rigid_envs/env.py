@@ -63,6 +63,11 @@ class RigidEnv(gym.Env[Observation, Array]):
         self.observation_space: Any = self._runner.observation_space
         self.action_space = self._runner.action_space
 
+    @property
+    def task(self) -> Task:
+        """What is to be done in the world."""
+        return self._runner.task
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:

@@ -1,5 +1,6 @@
 """Painter: solids as polygons and pictures of balls, on a canvas that a camera looks at."""
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -138,7 +139,7 @@ class Painter:
 
     def _draw_ball(self, centre: Array, radius: float, color: Color, *, glass: bool) -> None:
         pixel, depth = self.project(centre)
-        distance = float(np.sqrt(max(depth**2 - radius**2, 1e-9)))
+        distance = math.sqrt(max(float(depth) ** 2 - radius**2, 1e-9))
         diameter = max(round(2.0 * self._focal * radius / distance), 2)
         ball = self._scaled_ball(color, glass, diameter)
         self._canvas.blit(ball, np.rint(pixel - 0.5 * diameter).astype(int).tolist())

@@ -152,7 +152,7 @@ class Renderer:
         cast[..., 2] = 0.0
         pixels, depth = self._painter.project(cast)
         pixels = np.rint(pixels / SUPERSAMPLING).astype(int)
-        starts = [0, *ends[:-1]]
+        starts = [0, *ends][:-1]
         shown = [
             slice(start, end)
             for start, end in zip(starts, ends, strict=True)

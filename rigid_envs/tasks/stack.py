@@ -134,7 +134,8 @@ class Stack(Task):
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
         """A place for each cube, in its colour."""
         places = goal[:-1].reshape(-1, 3)
-        return [Ghost((HALF,) * 3, p, c) for p, c in zip(places, BODY_COLORS, strict=False)]
+        half = np.full(3, HALF)
+        return [Ghost(half, p, c) for p, c in zip(places, BODY_COLORS, strict=False)]
 
     def _pressing(self, world: World) -> Array:
         """[count, blocks, 2] N with which each finger presses each cube."""
