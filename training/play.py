@@ -152,7 +152,7 @@ def _show(window: Window, picture: Array, text: Sequence[str]) -> list[Key]:
     except pygame.error as error:
         raise UsageError(f"no window can be opened: {error}") from None
     # without a display SDL draws to nowhere and says nothing; whoever names such a driver wants it
-    if not window.closed and pygame.display.get_driver() in ("offscreen", "dummy"):
-        if "SDL_VIDEODRIVER" not in os.environ:
-            raise UsageError("no window can be opened: there is no display")
+    asked_for = "SDL_VIDEODRIVER" in os.environ
+    if not (window.closed or asked_for) and pygame.display.get_driver() in ("offscreen", "dummy"):
+        raise UsageError("no window can be opened: there is no display")
     return keys

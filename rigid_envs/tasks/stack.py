@@ -33,7 +33,7 @@ class Stack(Task):
 
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
     # the fingers close across the picture
-    camera = Camera(target=(0.0, 0.0, 0.14), distance=1.08, azimuth=-25.0, elevation=26.0)
+    camera = Camera(target=(0.0, 0.0, 0.14), distance=1.15, azimuth=-25.0, elevation=26.0)
 
     def __init__(self, blocks: int = 2) -> None:
         """Lists what is observed of so many cubes."""
