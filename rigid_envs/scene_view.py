@@ -14,9 +14,10 @@ STATIC_COLOR = (170, 170, 165)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 # m of arrow to a newton
 FORCE_SCALE = 0.03
-# of a gripper's mechanism in m: its fingers' half thickness, how far the bar is above the pads and
-# how far it reaches beyond them, half the bar's height, half the length of the post on it
-THIN, ABOVE, BEYOND, BAR, POST = 0.004, 0.055, 0.01, 0.006, 0.02
+# of a gripper's mechanism in m: its fingers' half thickness, how far the bar is above the hand and
+# how far it reaches beyond the fingers, half the bar's height, half the length of the post on it,
+# and the least distance of fingers that the bar is made for
+THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
 
 
 def items(runner: Runner, world: int, *, particles: bool = False) -> list[Item]:
@@ -82,12 +83,12 @@ def _particles(runner: Runner, solid: int, shape: object) -> Particles | None:
 
 def _arm(gripper: Gripper, near: Array, far: Array) -> list[Item]:
     """Fingers that hang from a bar with a post: nothing solid, for a person to see a gripper."""
-    reach = min(gripper.shape.reach, 0.5 * gripper.shape.width)
-    hand, widest = 0.5 * (near + far), 0.5 * gripper.distance
-    up = np.array([0.0, 0.0, 1.0])
-    length = 0.5 * (ABOVE - reach - BAR)  # half a finger's
-    half = max(widest, 0.5 * float(far[1] - near[1]), 5.0 * reach) + BEYOND
-    parts = [(Box((THIN, THIN, length)), pad + (reach + length) * up) for pad in (near, far)]
+    pad = 0.5 * gripper.shape.width
+    hand, up = 0.5 * (near + far), np.array([0.0, 0.0, 1.0])
+    length = 0.5 * (ABOVE - pad - BAR)  # half a finger's
+    apart = max(gripper.distance, float(far[1] - near[1]), NARROWEST)
+    half = 0.5 * apart + BEYOND
+    parts = [(Box((THIN, THIN, length)), end + (pad + length) * up) for end in (near, far)]
     parts.append((Box((1.5 * THIN, half, BAR)), hand + ABOVE * up))
     parts.append((Box((1.5 * THIN, 1.5 * THIN, POST)), hand + (ABOVE + BAR + POST) * up))
     return [Item(shape, position, UPRIGHT, ARM_COLOR) for shape, position in parts]

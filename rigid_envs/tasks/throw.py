@@ -26,8 +26,8 @@ class Throw(Task):
     """Where the ball first touches the ground counts, and before that, where it is."""
 
     hand = Hand(home=(-0.1, 0.0, 0.25), low=(-0.3, -0.2, 0.1), high=(0.3, 0.2, 0.5), stride=0.12)
-    # over the thrower's shoulder: no other view shows hand and targets as large
-    camera = Camera((0.34, 0.0, 0.22), 1.95, azimuth=-150.0, elevation=36.0, field_of_view=40.0)
+    # from the side for the arc of a throw, and from behind for the fingers
+    camera = Camera((0.4, 0.0, 0.16), 2.2, azimuth=-128.0, elevation=30.0, field_of_view=45.0)
 
     actions = hand.actions
     bounds = (
@@ -110,4 +110,4 @@ class Throw(Task):
         spot = goal * (1.0, 1.0, 0.0)
         shown: list[Sign] = [Goal(spot, THRESHOLD), Goal(spot, 0.3 * THRESHOLD)]
         landed = world.first_touch_position(BALL, GROUND)[index]
-        return shown if np.isnan(landed).any() else [*shown, Mark(landed, 0.3 * THRESHOLD)]
+        return shown if np.isnan(landed).any() else [*shown, Mark(landed, 0.4 * THRESHOLD)]
