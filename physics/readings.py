@@ -190,7 +190,7 @@ class Readings:
     def _solid(self, name: str, value: int) -> int:
         """The index of a solid."""
         index = integer(name, value, low=0)
-        last = self._bodies + len(self.scene.tools) + len(self.scene.statics) - 1
+        last = len(self._model.mover) + len(self._model.static) - 1
         if index > last:
             raise ValueError(
                 f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
