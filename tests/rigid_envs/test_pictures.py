@@ -274,3 +274,16 @@ def test_an_environment_draws_without_a_banner_and_without_a_display():
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout == ""
+
+
+def test_pygame_is_imported_with_the_first_picture_only():
+    program = (
+        "import sys\n"
+        "import gymnasium as gym\n"
+        f"env = gym.make('rigid_envs:{PUSH}', render_mode='rgb_array', fidelity='fast')\n"
+        "env.reset(seed=0)\n"
+        "assert 'pygame' not in sys.modules\n"
+        "env.render()\n"
+        "assert 'pygame' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
