@@ -16,11 +16,11 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
 from physics import World
 from rigid_envs import scene_view
-from rigid_envs.registration import ENVIRONMENTS
 from rigid_envs.rendering import Mark, grid
 from rigid_envs.tasks import Push, Stack, Throw, push
 from rigid_envs.view import BODY_COLORS
 from tests.rigid_envs.rollout import (
+    IDS,
     PUSH,
     make,
     make_vec,
@@ -28,10 +28,9 @@ from tests.rigid_envs.rollout import (
 )
 
 FRAME = (480, 480, 3)
-TASKS = list(ENVIRONMENTS)
 
 
-@pytest.mark.parametrize("env_id", TASKS)
+@pytest.mark.parametrize("env_id", IDS)
 def test_a_picture_follows_the_world(env_id):
     env = make(env_id, render_mode="rgb_array")
     env.reset(seed=0)
@@ -113,7 +112,7 @@ def length_and_size(film):
         return reader.count_frames(), reader.get_meta_data()["source_size"]
 
 
-@pytest.mark.parametrize("env_id", TASKS)
+@pytest.mark.parametrize("env_id", IDS)
 def test_an_episode_of_one_world_can_be_filmed(env_id, tmp_path):
     env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=8)
     env = RecordVideo(
@@ -128,7 +127,7 @@ def test_an_episode_of_one_world_can_be_filmed(env_id, tmp_path):
     assert length_and_size(film) == (9, (480, 480))  # the start, and a frame a step
 
 
-@pytest.mark.parametrize("env_id", TASKS)
+@pytest.mark.parametrize("env_id", IDS)
 def test_episodes_of_many_worlds_can_be_filmed(env_id, tmp_path):
     envs = make_vec(4, env_id, render_mode="rgb_array", max_episode_steps=8, render_size=160)
     with warnings.catch_warnings():
@@ -158,7 +157,7 @@ def test_of_many_worlds_the_first_are_drawn():
         assert len(more.render()) == 20
 
 
-@pytest.mark.parametrize("env_id", TASKS)
+@pytest.mark.parametrize("env_id", IDS)
 @pytest.mark.parametrize("option", ["show_forces", "show_particles"])
 def test_one_world_and_many_draw_alike(env_id, option):
     """Contact forces of what lies on the ground and in a hand; what solids touch with."""
