@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from benchmarks import accuracy, features, memory, speed, startup, tradeoff
+from benchmarks import accuracy, features, memory, pictures, speed, startup, tradeoff
 from benchmarks.report import Table, circumstances, describe, plain
 from benchmarks.tables import RESULTS
 
@@ -14,6 +14,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Table]]] = {
     "speed": speed.measure,
     "startup": startup.measure,
     "memory": memory.measure,
+    "pictures": pictures.measure,
     "accuracy": accuracy.measure,
     "features": features.measure,
     "tradeoff": tradeoff.measure,

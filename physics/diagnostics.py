@@ -208,6 +208,21 @@ def between(model: Model, first: int, second: int) -> Array:
     return np.asarray((ends == sorted((first, second))).all(axis=-1))
 
 
+def samples(model: Model, solid: int) -> tuple[Array, float]:
+    """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m."""
+    side = model.side
+    for at, first, count in (
+        ("owner", "first_sample", "sample_count"),
+        ("surface", "first_partner", "partner_count"),
+    ):
+        # the same points meet every other solid
+        for row in side[(side[at] == solid) & (side[count] > 0)][:1]:
+            points = model.sample[row[first] : row[first] + row[count], :3]
+            both = float(row["radius"]), float(row["owner_radius"])
+            return points.copy(), both[1] if at == "owner" else both[0] - both[1]
+    return np.zeros((0, 3)), 0.0
+
+
 def penetration(model: Model, features: Features, state: State) -> Array:
     """Deepest overlap of each world now, [w] m, 0 where nothing touches."""
     deepest = np.zeros(len(state.world))

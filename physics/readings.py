@@ -144,6 +144,16 @@ class Readings:
             self._model, self._features, self._state, self._world_index(world)
         )
 
+    def samples(self, solid: int) -> tuple[Array, float]:
+        """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m.
+
+        A solid that others only touch with theirs, as the ground, has none.
+
+        Args:
+            solid: its index, as in `first_touch`.
+        """
+        return diagnostics.samples(self._model, self._solid("solid", solid))
+
     def first_touch(self, first: int, second: int) -> Array:
         """[count] s, when two solids first touched since their state was set; NaN before.
 
@@ -177,18 +187,22 @@ class Readings:
         self._settle()
         return diagnostics.pressing(self._state, self._sides_between[ends])
 
+    def _solid(self, name: str, value: int) -> int:
+        """The index of a solid."""
+        index = integer(name, value, low=0)
+        last = len(self._model.mover) + len(self._model.static) - 1
+        if index > last:
+            raise ValueError(
+                f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
+                f"statics), got {value}"
+            )
+        return index
+
     def _pair(self, first: int, second: int) -> tuple[int, int]:
         """Two solids that can meet; the sides between them are then known."""
         if (first, second) in self._sides_between:
             return first, second
-        ends = integer("first", first, low=0), integer("second", second, low=0)
-        last = self._bodies + len(self.scene.tools) + len(self.scene.statics) - 1
-        for name, value in zip(("first", "second"), ends, strict=True):
-            if value > last:
-                raise ValueError(
-                    f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
-                    f"statics), got {value}"
-                )
+        ends = self._solid("first", first), self._solid("second", second)
         sides = np.flatnonzero(diagnostics.between(self._model, *ends))
         if not len(sides):
             raise ValueError(

@@ -6,16 +6,12 @@ import gymnasium as gym
 import numpy as np
 
 from physics import Fidelity
-from physics.validation import choice, instance
-from rigid_envs import scene_view
-from rigid_envs.rendering import Renderer
+from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
 from rigid_envs.tasks import Task
 
 Array = np.ndarray
-
-RENDER_MODES = ("rgb_array", "human")
 
 
 class RigidEnv(gym.Env[Observation, Array]):
@@ -27,12 +23,14 @@ class RigidEnv(gym.Env[Observation, Array]):
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" or "human".
         show_forces: draw contact forces.
+        show_particles: draw what the solids touch with in place of their exact shapes.
+        render_size: width and height of a picture in pixels.
         max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
         terminate_on_success: end an episode when it is solved.
         **arguments: of the task, as `blocks`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 25}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
     def __init__(
         self,
@@ -41,15 +39,14 @@ class RigidEnv(gym.Env[Observation, Array]):
         fidelity: str | Fidelity = "balanced",
         render_mode: str | None = None,
         show_forces: bool = False,
+        show_particles: bool = False,
+        render_size: int = 480,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the world; an episode begins with `reset`."""
-        if render_mode is not None:
-            choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
-        self._show_forces: bool = instance("show_forces", show_forces, bool)
         self._runner = Runner(
             task,
             1,
@@ -60,9 +57,16 @@ class RigidEnv(gym.Env[Observation, Array]):
             terminate_on_success,
             **arguments,
         )
-        self._renderer: Renderer | None = None
+        self._pictures = Pictures(
+            self._runner, render_mode, show_forces, show_particles, size=render_size
+        )
         self.observation_space: Any = self._runner.observation_space
         self.action_space = self._runner.action_space
+
+    @property
+    def task(self) -> Task:
+        """What is to be done in the world."""
+        return self._runner.task
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -129,13 +133,10 @@ class RigidEnv(gym.Env[Observation, Array]):
                 'render() needs a render mode: gym.make(..., render_mode="rgb_array") or "human"'
             )
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self.render_mode)
-        return self._renderer.frame(
-            scene_view.items(self._runner, 0),
-            goals=scene_view.goals(self._runner, 0),
-            forces=scene_view.forces(self._runner, 0) if self._show_forces else (),
-        )
+        if self.render_mode == "human":
+            self._pictures.show()
+            return None
+        return self._pictures.frames()[0]
 
     def get_state(self) -> dict[str, Any]:
         """Everything that the episode holds."""
@@ -147,9 +148,7 @@ class RigidEnv(gym.Env[Observation, Array]):
 
     def close(self) -> None:
         """Closes the window, if any."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._pictures.close()
 
 
 def _first(observation: Observation) -> Observation:

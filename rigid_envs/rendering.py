@@ -1,147 +1,117 @@
 """A small software renderer: shaded solids, soft shadows and a ruled ground, drawn with pygame.
 
 All is drawn at `SUPERSAMPLING` times the size of the picture and then reduced, which smooths the
-edges. What there is to see, and from where, is in `rigid_envs.view`.
+edges. What there is to see is in `rigid_envs.view`, how a solid is drawn in `rigid_envs.painter`.
 """
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.error import DependencyNotInstalled
 
-from physics.validation import choice, integer, positive
-from rigid_envs.view import (
-    ACROSS_LIGHT,
-    CIRCLE,
-    FACES,
-    LIGHTS,
-    SHADOW_SAMPLES,
-    TO_LIGHT,
-    Arrow,
-    Camera,
-    Color,
-    Goal,
-    Item,
-    Solids,
-    ground,
-    shade,
-)
+from physics.validation import integer
+from rigid_envs.camera import Camera
+from rigid_envs.painter import GHOST_FILL, Painter, whole
+from rigid_envs.solids import ACROSS_LIGHT, CIRCLE, LIGHTS, SHADOW_SAMPLES, Solids
+from rigid_envs.view import TO_LIGHT, Arrow, Ghost, Goal, Item, Mark, Particles, Sign, ground
+from rigid_envs.window import INK, load_pygame
 
-__all__ = ["TO_LIGHT", "Arrow", "Camera", "Goal", "Item", "Renderer", "grid"]
+__all__ = [
+    "TO_LIGHT",
+    "Arrow",
+    "Camera",
+    "Ghost",
+    "Goal",
+    "Item",
+    "Mark",
+    "Particles",
+    "Renderer",
+    "grid",
+]
 
 Array = np.ndarray
 
-RENDER_MODES = ("human", "rgb_array")
 SUPERSAMPLING = 2
 SHADOW_TINT = np.array([98.0, 92.0, 82.0])  # of 255, what full shadow takes; less blue, as the sky
-GLOSS = 0.4  # strength of the highlight on round solids
-CAPSULE_STRIPS = 32  # flat strips that make up the visible half of a tube
+SCALE = "squares: 10 cm"  # written in the corner, as lines alone don't tell how far apart they are
+DISC_FILL, DISC_EDGE = 80, 210  # opacity of 255
 
 
 class Renderer:
-    """Draws frames of solids on the ground.
+    """Draws frames of solids on the ground, off screen: it needs no display.
 
-    Mode "rgb_array" draws off screen and needs no display. Mode "human" opens a window with the
-    first frame and holds the pace of `fps`; once its user closes it, `closed` is true and nothing
-    more is drawn. A copy or pickle carries the settings and opens its own window.
+    A copy or pickle carries the settings.
 
     Args:
-        mode: "rgb_array" or "human".
         width: pixels.
         height: pixels.
         camera: where to look from; by default a square of 30 cm about the origin fills the picture.
-        fps: frames a second of the window.
-        title: of the window.
 
     Raises:
-        ValueError: an unknown mode, or a size or rate that is not positive.
+        ValueError: a size that is not positive.
         DependencyNotInstalled: pygame is missing.
     """
 
-    def __init__(
-        self,
-        mode: str,
-        width: int = 480,
-        height: int = 480,
-        camera: Camera | None = None,
-        fps: float = 25.0,
-        title: str = "",
-    ) -> None:
-        self.mode = choice("mode", mode, RENDER_MODES)
+    def __init__(self, width: int = 480, height: int = 480, camera: Camera | None = None) -> None:
         self.width = integer("width", width, low=1)
         self.height = integer("height", height, low=1)
         self.camera = camera or Camera()
-        self.fps = positive("fps", fps)
-        self.title = title
-        self.closed = False
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # no banner on import
-        try:
-            import pygame
-        except ImportError as error:
-            raise DependencyNotInstalled(
-                'rendering needs pygame: pip install "rigid-envs[render]"'
-            ) from error
-        self._pygame = pygame
-        self._window: Any = None
-        self._clock: Any = None
-        self._balls: dict[tuple[Color, bool], Any] = {}
+        self._pygame = pygame = load_pygame()
         size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
-        surfaces = [pygame.Surface(size, depth=32) for _ in range(4)]
-        self._background, self._canvas, self._shadow, self._layer = surfaces
-        self._picture = pygame.Surface((self.width, self.height), depth=32)
+        self._background, self._canvas = (pygame.Surface(size, depth=32) for _ in range(2))
+        size_of_picture = (self.width, self.height)
+        surfaces = [pygame.Surface(size_of_picture, depth=32) for _ in range(3)]
+        self._picture, self._shadow, self._layer = surfaces
+        self._painter = Painter(pygame, self._canvas, self.camera, SUPERSAMPLING)
         pygame.surfarray.blit_array(self._background, ground(self.camera, *size))
+        self._scale = self._words(SCALE, max(self.height // 30, 12))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Settings only: surfaces and windows can't be copied."""
-        settings = (self.mode, self.width, self.height, self.camera, self.fps, self.title)
-        return Renderer, settings
+        """Settings only: surfaces can't be copied."""
+        return Renderer, (self.width, self.height, self.camera)
 
     def frame(
         self,
         items: Sequence[Item],
         *,
-        goals: Sequence[Goal] = (),
+        signs: Sequence[Sign] = (),
         forces: Sequence[Arrow] = (),
         caption: str = "",
-    ) -> Array | None:
+    ) -> Array:
         """Draw one frame.
 
         Args:
             items: the solids.
-            goals: the targets.
+            signs: targets and marks.
             forces: arrows, drawn over everything else.
             caption: text for the top left corner.
 
         Returns:
-            A new array (height, width, 3) uint8 in mode "rgb_array", None in mode "human".
+            A new array (height, width, 3) uint8.
         """
-        if self.closed:
-            return None
+        goals = [sign for sign in signs if isinstance(sign, Goal)]
         balls = [goal for goal in goals if goal.position[2] > 0.0]
+        ghosts = self._painter.ghosts([sign for sign in signs if isinstance(sign, Ghost)])
         colors = [item.color for item in items] + [ball.color for ball in balls]
         solids = Solids(items, balls)
         self._canvas.blit(self._background, (0, 0))
         for goal in goals:
             self._draw_disc(goal)
-        self._draw_shadows(solids.outline(ACROSS_LIGHT)[: len(items)])
-        for i in solids.paint_order(self.camera.eye):
-            self._draw_solid(solids, i, colors[i], glass=i >= len(items))
-        for arrow in forces:
-            self._draw_arrow(arrow)
+        for sign in signs:
+            if isinstance(sign, Mark):
+                self._draw_mark(sign)
+        self._draw_shadows(*solids.outlines(ACROSS_LIGHT, len(items)))
+        for color, faces in ghosts:
+            self._painter.glass(color, faces, GHOST_FILL)
+        self._painter.draw_solids(solids, colors, [item.particles for item in items])
+        for color, faces in ghosts:
+            for face in faces:
+                self._painter.polygon(color, face, SUPERSAMPLING)
+        self._draw_arrows(forces)
         self._pygame.transform.smoothscale(self._canvas, self._picture.get_size(), self._picture)
-        self._draw_caption(caption)
-        if self.mode == "human":
-            self._show()
-            return None
+        self._write(self._words(caption, max(self.height // 22, 14)), top=True)
+        self._write(self._scale, top=False)
         return self._read()
-
-    def close(self) -> None:
-        """Close the window, if there is one; a closed window is not opened again."""
-        if self._window is not None:
-            self._pygame.display.quit()
-        self._window, self.closed = None, self.mode == "human"
 
     def _read(self) -> Array:
         pixels = np.empty((self.height, self.width, 3), np.uint8)
@@ -150,143 +120,92 @@ class Renderer:
         frame.blit(self._picture, (0, 0))
         return pixels
 
-    def _show(self) -> None:
-        if self._window is None:
-            self._pygame.display.init()
-            self._window = self._pygame.display.set_mode((self.width, self.height))
-            self._pygame.display.set_caption(self.title)
-            self._clock = self._pygame.time.Clock()
-        self._window.blit(self._picture, (0, 0))
-        self._pygame.display.flip()
-        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
-            self.close()
-        else:
-            self._clock.tick(self.fps)
-
-    def _project(self, points: Array) -> tuple[Array, Array]:
-        return self.camera.project(points, *self._canvas.get_size())
-
-    def _polygon(self, surface: Any, color: Any, pixels: Array, width: int = 0) -> None:
-        points = np.rint(pixels).astype(int).tolist()
-        self._pygame.draw.polygon(surface, tuple(map(int, color)), points, width)
-
     def _draw_disc(self, goal: Goal) -> None:
         foot = np.array([*goal.position[:2], 0.0])
-        pixels, depth = self._project(foot + goal.radius * np.pad(CIRCLE, ((0, 0), (0, 1))))
+        around = foot + goal.radius * np.pad(CIRCLE, ((0, 0), (0, 1)))
+        pixels, depth = self._painter.project(around)
         if depth.min() < self.camera.near:
             return
-        low = np.floor(pixels.min(axis=0)) - SUPERSAMPLING
-        size = np.ceil(pixels.max(axis=0)) + SUPERSAMPLING + 1 - low
-        glass = self._pygame.Surface(size.astype(int).tolist(), self._pygame.SRCALPHA)
-        self._polygon(glass, (*goal.color, 80), pixels - low)
-        self._polygon(glass, (*goal.color, 210), pixels - low, SUPERSAMPLING)
-        self._canvas.blit(glass, low.astype(int).tolist())
+        self._painter.glass(goal.color, [whole(pixels)], DISC_FILL, DISC_EDGE)
         if goal.position[2] > goal.radius:  # a stem shows over which spot the ball hangs
-            foot_pixel, ball_pixel = self._project(np.array([foot, goal.position]))[0].tolist()
-            self._pygame.draw.line(self._canvas, goal.color, foot_pixel, ball_pixel, SUPERSAMPLING)
+            ends = self._painter.project(np.array([foot, goal.position]))[0].tolist()
+            self._pygame.draw.line(self._canvas, goal.color, *ends, SUPERSAMPLING)
 
-    def _draw_shadows(self, outlines: Array) -> None:
-        """Darken the ground where solids hide the light; outlines [n, k, 3] m face the light.
+    def _draw_mark(self, mark: Mark) -> None:
+        foot = np.array([*mark.position[:2], 0.0])
+        for along in (np.array([1.0, 1.0, 0.0]), np.array([1.0, -1.0, 0.0])):
+            along *= np.sqrt(0.5) * mark.radius
+            across = 0.25 * np.array([-along[1], along[0], 0.0])
+            arm = [along + across, along - across, -along - across, -along + across]
+            pixels, depth = self._painter.project(foot + np.array(arm))
+            if depth.min() > self.camera.near:
+                self._painter.polygon(mark.color, whole(pixels))
 
-        Each point of the light removes its share from the union of the shadows that it casts.
+    def _draw_shadows(self, outlines: Array, ends: list[int]) -> None:
+        """Darken the ground where solids hide the light; outlines [m, 3] m face the light.
+
+        Each point of the light removes its share from the union of the shadows that it casts. They
+        are soft, so the size of the picture is fine enough.
         """
-        lights = LIGHTS[:, None, None]
-        cast = outlines - np.maximum(outlines[..., 2:], 0.0) * lights / lights[..., 2:]
+        lights = LIGHTS[:, None]
+        cast = outlines - np.maximum(outlines[:, 2:], 0.0) * lights / lights[..., 2:]
         cast[..., 2] = 0.0
-        pixels, depth = self._project(cast)
-        pixels = np.rint(pixels[:, (depth > self.camera.near).all(axis=(0, 2))]).astype(int)
-        if not pixels.size:
+        pixels, depth = self._painter.project(cast)
+        pixels = np.rint(pixels / SUPERSAMPLING).astype(int)
+        starts = [0, *ends][:-1]
+        shown = [
+            slice(start, end)
+            for start, end in zip(starts, ends, strict=True)
+            if depth[:, start:end].min() > self.camera.near
+        ]
+        if not shown:
             return
-        low, high = pixels.min((0, 1, 2)), pixels.max((0, 1, 2))
-        area = self._pygame.Rect(low.tolist(), (high - low + 1).tolist())
-        area = area.clip(self._canvas.get_rect())
+        reach = np.concatenate([pixels[:, part] for part in shown], axis=1)
+        low, high = reach.min((0, 1)), reach.max((0, 1))
+        # one pixel more all around, for the way back to the canvas mixes neighbours
+        area = self._pygame.Rect((low - 1).tolist(), (high - low + 3).tolist())
+        area = area.clip(self._shadow.get_rect())
+        if not area:
+            return
         tint = np.rint(SHADOW_TINT / SHADOW_SAMPLES).astype(int).tolist()
         self._shadow.fill((255, 255, 255), area)
-        for shadows in pixels.tolist():
+        for points in pixels.tolist():
             self._layer.fill((0, 0, 0), area)
-            for shadow in shadows:
-                self._pygame.draw.polygon(self._layer, tint, shadow)
+            for part in shown:
+                self._pygame.draw.polygon(self._layer, tint, points[part])
             self._shadow.blit(self._layer, area, area, self._pygame.BLEND_RGB_SUB)
-        self._canvas.blit(self._shadow, area, area, self._pygame.BLEND_RGB_MULT)
+        size = (SUPERSAMPLING * area.width, SUPERSAMPLING * area.height)
+        fine = self._pygame.transform.smoothscale(self._shadow.subsurface(area), size)
+        place = (SUPERSAMPLING * area.left, SUPERSAMPLING * area.top)
+        self._canvas.blit(fine, place, special_flags=self._pygame.BLEND_RGB_MULT)
 
-    def _draw_solid(self, solids: Solids, i: int, color: Color, *, glass: bool) -> None:
-        pixels, depth = self._project(solids.corners[i])
-        if depth.min() - solids.radius[i] < self.camera.near:
+    def _draw_arrows(self, arrows: Sequence[Arrow]) -> None:
+        if not arrows:
             return
-        if not solids.radius[i]:
-            self._draw_box(solids, i, pixels, color)
-        elif solids.half[i].any():
-            self._draw_capsule(solids, i, color)
-        else:
-            self._draw_ball(solids.centre[i], solids.radius[i], color, glass=glass)
+        origins = np.stack([arrow.origin for arrow in arrows])
+        ends = np.stack([origins, origins + np.stack([arrow.vector for arrow in arrows])], axis=1)
+        pixels, depth = self._painter.project(ends)
+        for arrow, (tail, tip), nearest in zip(arrows, pixels, depth.min(axis=1), strict=True):
+            length = float(np.hypot(*(tip - tail)))
+            if length < 1.0 or nearest < self.camera.near:
+                continue
+            along = (tip - tail) / length
+            across = SUPERSAMPLING * np.array([-along[1], along[0]])
+            neck = tip - min(8.0 * SUPERSAMPLING, 0.6 * length) * along
+            left = [tail + across, neck + across, neck + 4.0 * across]
+            right = [neck - 4.0 * across, neck - across, tail - across]
+            self._painter.polygon(arrow.color, whole(np.array([*left, tip, *right])))
 
-    def _draw_box(self, solids: Solids, i: int, pixels: Array, color: Color) -> None:
-        eye = (self.camera.eye - solids.centre[i]) @ solids.axes[i]  # m, as the box sees it
-        for axis, side, corners in FACES:
-            if side * eye[axis] > solids.half[i, axis]:
-                normal = side * solids.axes[i, :, axis]
-                paint = shade(color, normal, -self.camera.axes[2], 0.0)
-                self._polygon(self._canvas, paint, pixels[corners])
-                self._polygon(self._canvas, 0.72 * paint, pixels[corners], SUPERSAMPLING)
-
-    def _draw_ball(self, centre: Array, radius: float, color: Color, *, glass: bool) -> None:
-        pixel, depth = self._project(centre)
-        focal = self.camera.focal_length(self._canvas.get_height())
-        diameter = max(round(2.0 * focal * radius / float(np.sqrt(depth**2 - radius**2))), 2)
-        ball = self._pygame.transform.smoothscale(self._ball(color, glass), (diameter,) * 2)
-        self._canvas.blit(ball, np.rint(pixel - 0.5 * diameter).astype(int).tolist())
-
-    def _ball(self, color: Color, glass: bool, size: int = 128) -> Any:
-        """Picture of a ball, to be scaled: shaded, or see-through with a stronger rim."""
-        if (color, glass) not in self._balls:
-            y, x = -(np.mgrid[:size, :size] + 0.5 - 0.5 * size) / (0.5 * size)
-            off = np.hypot(x, y)
-            normals = np.stack([-x, y, np.sqrt(np.maximum(1.0 - off**2, 0.0))], axis=-1)
-            normals /= np.maximum(off, 1.0)[..., None]
-            to_eye = -self.camera.axes[2]
-            world = normals @ np.stack([*self.camera.axes[:2], to_eye])
-            alpha = 0.30 + 0.55 * (1.0 - normals[..., 2:]) ** 2 if glass else 1.0
-            alpha = alpha * np.clip(0.5 * size * (1.0 - off[..., None]) + 0.5, 0.0, 1.0)
-            pixels = np.concatenate([shade(color, world, to_eye, GLOSS), 255.0 * alpha], axis=-1)
-            self._balls[color, glass] = self._pygame.image.frombuffer(
-                pixels.astype(np.uint8).tobytes(), (size, size), "RGBA"
-            )
-        return self._balls[color, glass]
-
-    def _draw_capsule(self, solids: Solids, i: int, color: Color) -> None:
-        """Draw the end balls, then strips of the tube, which hide just the balls' inner halves."""
-        ends, axis, radius = solids.corners[i, :2], solids.axes[i, :, 2], solids.radius[i]
-        for end in ends:
-            self._draw_ball(end, radius, color, glass=False)
-        side = np.cross(axis, self.camera.eye - solids.centre[i])
-        side /= max(float(np.linalg.norm(side)), 1e-9)
-        turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * CAPSULE_STRIPS + 1)[:, None]
-        normals = np.sin(turn) * side + np.cos(turn) * np.cross(side, axis)
-        pixels, _ = self._project(ends[:, None] + radius * normals[::2])
-        paints = shade(color, normals[1::2], -self.camera.axes[2], GLOSS)
-        for k, paint in enumerate(paints):
-            self._polygon(self._canvas, paint, pixels[[0, 0, 1, 1], [k, k + 1, k + 1, k]])
-
-    def _draw_arrow(self, arrow: Arrow) -> None:
-        (tail, tip), depth = self._project(
-            np.array([arrow.origin, np.add(arrow.origin, arrow.vector)])
-        )
-        length = np.linalg.norm(tip - tail)
-        if length < 1.0 or depth.min() < self.camera.near:
-            return
-        along = (tip - tail) / length
-        across = SUPERSAMPLING * np.array([-along[1], along[0]])
-        neck = tip - min(8.0 * SUPERSAMPLING, 0.6 * length) * along
-        left = [tail + across, neck + across, neck + 4.0 * across]
-        right = [neck - 4.0 * across, neck - across, tail - across]
-        self._polygon(self._canvas, arrow.color, np.array([*left, tip, *right]))
-
-    def _draw_caption(self, caption: str) -> None:
+    def _words(self, text: str, size: int) -> Any:
         font = self._pygame.font
-        if caption and font:  # pygame without SDL_ttf has no fonts
-            font.init()
-            face = font.Font(None, max(self.height // 22, 14))
-            self._picture.blit(face.render(caption, True, (52, 58, 66)), (10, 10))
+        if not text or not font:  # pygame without SDL_ttf has no fonts
+            return None
+        font.init()
+        return font.Font(None, size).render(text, True, INK)
+
+    def _write(self, words: Any, *, top: bool) -> None:
+        if words is not None:
+            self._picture.blit(words, (10, 10 if top else self.height - 8 - words.get_height()))
 
 
 def grid(frames: Sequence[Array], columns: int | None = None) -> Array:

@@ -2,19 +2,26 @@
 
 import numpy as np
 
-from physics import Static
+from physics import Box, Gripper, Sphere, Static
 from rigid_envs.runner import Runner
-from rigid_envs.view import Arrow, Goal, Item
+from rigid_envs.view import BODY_COLORS, Arrow, Item, Particles, Sign
 
-BODY_COLORS = ((222, 132, 68), (86, 128, 196), (206, 92, 104), (118, 160, 84), (150, 112, 178))
+Array = np.ndarray
+
 DRIVE_COLOR = (92, 98, 110)
+ARM_COLOR = (150, 156, 166)
 STATIC_COLOR = (170, 170, 165)
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 # m of arrow to a newton
-FORCE_SCALE = 0.02
+FORCE_SCALE = 0.03
+# of a gripper's mechanism in m: its fingers' half thickness, how far the bar is above the hand and
+# how far it reaches beyond the fingers, half the bar's height, half the length of the post on it,
+# and the least distance of fingers that the bar is made for
+THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
 
 
-def items(runner: Runner, world: int) -> list[Item]:
-    """Bodies, drives and statics of one world."""
+def items(runner: Runner, world: int, *, particles: bool = False) -> list[Item]:
+    """Bodies, drives and statics of one world, as particles if asked for; and grippers' arms."""
     engine, scene = runner.world, runner.world.scene
     found = [
         Item(
@@ -22,30 +29,66 @@ def items(runner: Runner, world: int) -> list[Item]:
             engine.position[world, i],
             engine.orientation[world, i],
             BODY_COLORS[i % len(BODY_COLORS)],
+            _particles(runner, i, body.shape) if particles else None,
         )
         for i, body in enumerate(scene.bodies)
     ]
+    tools, first = engine.drive_position[world], len(scene.bodies)
     for i, drive in enumerate(scene.tools):
-        orientation = np.array(drive.orientation)
-        position = engine.drive_position[world, i]
-        found.append(Item(drive.shape, position, orientation, DRIVE_COLOR))
-    for static in scene.statics:
+        balls = _particles(runner, first + i, drive.shape) if particles else None
+        found.append(Item(drive.shape, tools[i], np.array(drive.orientation), DRIVE_COLOR, balls))
+    for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
             pose = np.array(static.position), np.array(static.orientation)
-            found.append(Item(static.shape, *pose, STATIC_COLOR))
+            solid = first + len(scene.tools) + i
+            balls = _particles(runner, solid, static.shape) if particles else None
+            found.append(Item(static.shape, *pose, STATIC_COLOR, balls))
+    for i, gripper in scene.grippers:
+        found += _arm(gripper, tools[i], tools[i + 1])
     return found
 
 
-def goals(runner: Runner, world: int) -> list[Goal]:
-    """The goal of one world: a marker every three components."""
-    points = runner.goals[world].astype(float).reshape(-1, 3)
-    return [Goal(point, runner.task.reward.threshold) for point in points]
+def signs(runner: Runner, world: int) -> list[Sign]:
+    """Goal and marks of one world, as its task has them."""
+    goal = runner.goals[world].astype(float)
+    return list(runner.task.signs(runner.world, world, goal))
 
 
-def forces(runner: Runner, world: int) -> list[Arrow]:
-    """The contact forces of one world."""
+def forces(runner: Runner, world: int, *, particles: bool = False) -> list[Arrow]:
+    """The contact forces of one world: of each two solids the sum, or of each of their points.
+
+    An arrow starts where a force acts and points as it acts on the first of the two solids: on a
+    body rather than a tool, on a tool rather than the ground.
+    """
     contacts = runner.world.contacts(world)
-    return [
-        Arrow(point, FORCE_SCALE * force)
-        for point, force in zip(contacts.point, contacts.force, strict=True)
-    ]
+    pair, point, force = contacts.pair, contacts.point, contacts.force
+    first, last = pair.min(axis=1, initial=10**6), pair.max(axis=1, initial=0)
+    force = np.where((pair[:, 0] > pair[:, 1])[:, None], -force, force)
+    if particles:
+        return [Arrow(p, FORCE_SCALE * f) for p, f in zip(point, force, strict=True)]
+    arrows = []
+    for a, b in sorted(set(zip(first.tolist(), last.tolist(), strict=True))):
+        chosen = (first == a) & (last == b)
+        pressing = np.linalg.norm(force[chosen], axis=1) + 1e-9
+        middle = pressing @ point[chosen] / pressing.sum()
+        arrows.append(Arrow(middle, FORCE_SCALE * force[chosen].sum(axis=0)))
+    return arrows
+
+
+def _particles(runner: Runner, solid: int, shape: object) -> Particles | None:
+    """What a solid touches with; None if that is nothing, or the shape itself."""
+    positions, radius = runner.world.samples(solid)
+    return None if isinstance(shape, Sphere) or not len(positions) else Particles(positions, radius)
+
+
+def _arm(gripper: Gripper, near: Array, far: Array) -> list[Item]:
+    """Fingers that hang from a bar with a post: nothing solid, for a person to see a gripper."""
+    pad = 0.5 * gripper.shape.width
+    hand, up = 0.5 * (near + far), np.array([0.0, 0.0, 1.0])
+    length = 0.5 * (ABOVE - pad - BAR)  # half a finger's
+    apart = max(gripper.distance, float(far[1] - near[1]), NARROWEST)
+    half = 0.5 * apart + BEYOND
+    parts = [(Box((THIN, THIN, length)), end + (pad + length) * up) for end in (near, far)]
+    parts.append((Box((1.5 * THIN, half, BAR)), hand + ABOVE * up))
+    parts.append((Box((1.5 * THIN, 1.5 * THIN, POST)), hand + (ABOVE + BAR + POST) * up))
+    return [Item(shape, position, UPRIGHT, ARM_COLOR) for shape, position in parts]

@@ -9,9 +9,7 @@ from gymnasium.vector.utils import batch_space
 
 from physics import Fidelity
 from physics.validation import choice, integer
-from rigid_envs import scene_view
-from rigid_envs.env import RENDER_MODES
-from rigid_envs.rendering import Renderer
+from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
 from rigid_envs.tasks import Task
@@ -29,7 +27,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         num_envs: number of worlds.
         reward_type: "sparse": -1 or 0; "dense": shaped.
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
-        render_mode: None, "rgb_array" (a frame a world) or "human" (shows the first).
+        render_mode: None, "rgb_array" (a frame a world) or "human" (a grid of them).
+        show_forces: draw contact forces.
+        show_particles: draw what the solids touch with in place of their exact shapes.
+        render_worlds: how many worlds to draw at most: the first ones.
+        render_size: width and height of a world's picture in pixels.
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
         autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as gymnasium.vector.AutoresetMode.
@@ -39,7 +41,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
 
     metadata: dict[str, Any] = {
         "render_modes": list(RENDER_MODES),
-        "render_fps": 25,
+        "render_fps": FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -50,6 +52,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",
         render_mode: str | None = None,
+        show_forces: bool = False,
+        show_particles: bool = False,
+        render_worlds: int = 16,
+        render_size: int = 480,
         max_episode_steps: int | None = 50,
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -58,8 +64,6 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     ) -> None:
         """Builds the worlds; episodes begin with `reset`."""
         self.num_envs = integer("num_envs", num_envs, low=1)
-        if render_mode is not None:
-            choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
@@ -73,7 +77,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             terminate_on_success,
             **arguments,
         )
-        self._renderer: Renderer | None = None
+        self._pictures = Pictures(
+            self._runner, render_mode, show_forces, show_particles, render_worlds, render_size
+        )
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self.single_observation_space = self._runner.observation_space
         self.single_action_space = self._runner.action_space
@@ -189,25 +195,18 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
 
     def render(self) -> tuple[Array, ...] | None:
-        """A frame [480, 480, 3] uint8 of each world; "human" shows the first and gives None.
+        """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them as a grid.
 
-        `rigid_envs.rendering.grid` makes one picture of several frames.
+        At most `render_worlds` are drawn. `rigid_envs.rendering.grid` makes one picture of several
+        frames.
         """
         if self.render_mode is None:
             gym.logger.warn('render() needs gym.make_vec(..., render_mode="rgb_array") or "human"')
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self.render_mode)
-        shown = 1 if self.render_mode == "human" else self.num_envs
-        frames = [
-            self._renderer.frame(
-                scene_view.items(self._runner, world), goals=scene_view.goals(self._runner, world)
-            )
-            for world in range(shown)
-        ]
         if self.render_mode == "human":
+            self._pictures.show()
             return None
-        return tuple(frame for frame in frames if frame is not None)
+        return self._pictures.frames()
 
     def get_state(self) -> dict[str, Any]:
         """Everything that the episodes hold."""
@@ -224,9 +223,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Closes the window, if any."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._pictures.close()
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:

@@ -1,4 +1,4 @@
-"""The command line: `rigid-envs train | evaluate | record | scripted | plot | demo`.
+"""The command line: `rigid-envs train | evaluate | record | scripted | play | plot | demo`.
 
 Starts without Stable-Baselines3 or torch: each command imports what it needs, and says which extra
 installs what is missing. Flags follow rl-baselines3-zoo where it has a counterpart.
@@ -30,6 +30,7 @@ TRAIN_EXTRA = (
     "imageio",
     "imageio_ffmpeg",
 )
+RENDER_EXTRA = ("pygame",)
 INTERRUPTED = 130
 """Exit status of a command ended by Ctrl-C, as shells have it."""
 
@@ -45,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         options = _parser().parse_args(arguments)
-        _require("train", TRAIN_EXTRA)
+        _require(*options.needs)
         status: int = options.run(options)
     except UsageError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -103,6 +104,24 @@ def _record(options: argparse.Namespace) -> int:
 def _scripted(options: argparse.Namespace) -> int:
     options.policy = "scripted"
     return _evaluate(options)
+
+
+def _play(options: argparse.Namespace) -> int:
+    from training.play import play
+
+    flags = {
+        "fidelity": options.fidelity,
+        "reward_type": options.reward,
+        "blocks": options.blocks,
+        "show_forces": options.show_forces or None,
+        "show_particles": options.show_particles or None,
+    }
+    arguments = {name: value for name, value in flags.items() if value is not None}
+    if options.env_kwargs:
+        _require("train", ("yaml",))
+        arguments = {**_env_kwargs(options), **arguments}
+    play(options.env, seed=options.seed, **arguments)
+    return 0
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -189,9 +208,14 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="rigid-envs", description="Train and watch policies on rigid bodies.")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    def command(name: str, run: Any, summary: str) -> argparse.ArgumentParser:
+    def command(
+        name: str,
+        run: Any,
+        summary: str,
+        needs: tuple[str, Sequence[str]] = ("train", TRAIN_EXTRA),
+    ) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=summary, description=summary)
-        added.set_defaults(run=run)
+        added.set_defaults(run=run, needs=needs)
         return added
 
     training = command("train", _train, "Train a policy into a run folder of its own.")
@@ -214,6 +238,21 @@ def _parser() -> argparse.ArgumentParser:
     scripted = command("scripted", _scripted, "Measure the scripted controller of an environment.")
     scripted.add_argument("--env", default=DEMO_ENV, help="environment id (default: %(default)s)")
     _add_episodes(scripted, 1000)
+
+    playing = command(
+        "play", _play, "Drive the tool by keyboard in a window.", ("render", RENDER_EXTRA)
+    )
+    playing.add_argument(
+        "env", nargs="?", default=DEMO_ENV, help="environment id (default: %(default)s)"
+    )
+    playing.add_argument("--seed", type=_whole, help="of the first episode (default: any)")
+    playing.add_argument("--reward", choices=("sparse", "dense"), help="reward to show")
+    playing.add_argument("--blocks", type=_count, help="cubes to stack")
+    playing.add_argument("--show-forces", action="store_true", help="draw contact forces")
+    playing.add_argument(
+        "--show-particles", action="store_true", help="draw what touches, not exact shapes"
+    )
+    _add_environment(playing)
 
     plotting = command("plot", _plot, "Draw the learning curve of a run.")
     plotting.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")

@@ -3,6 +3,7 @@
 import numpy as np
 
 from physics import Body, Box, Drive, Ground, Material, Readout, Scene, Sphere, World
+from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
 
@@ -35,6 +36,7 @@ class Push(Task):
     )
     goal_bounds = tuple((f"cube {a}", "m", -1.0, 1.0) for a in "xyz")
     draws = 3 + 2 * TRIES
+    camera = Camera(target=(-0.03, -0.04, 0.15), distance=1.28)
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
 
     def scene(self) -> Scene:

@@ -1,12 +1,16 @@
 """Stack: a gripper builds a tower of cubes at a goal."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from physics import Body, Box, Ground, Material, Readout, Scene, World
 from physics.validation import integer
+from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.hand import Hand
 from rigid_envs.tasks.task import Task
+from rigid_envs.view import BODY_COLORS, Ghost, Sign
 
 Array = np.ndarray
 
@@ -28,6 +32,8 @@ class Stack(Task):
     """
 
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
+    # the fingers close across the picture
+    camera = Camera(target=(0.0, 0.0, 0.14), distance=1.15, azimuth=-25.0, elevation=26.0)
 
     def __init__(self, blocks: int = 2) -> None:
         """Lists what is observed of so many cubes."""
@@ -124,6 +130,12 @@ class Stack(Task):
             "place": np.where(done, 1.0, place),
             "stage": (placed + stage) / (n + 0.5),
         }
+
+    def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
+        """A place for each cube, in its colour."""
+        places = goal[:-1].reshape(-1, 3)
+        half = np.full(3, HALF)
+        return [Ghost(half, p, c) for p, c in zip(places, BODY_COLORS, strict=False)]
 
     def _pressing(self, world: World) -> Array:
         """[count, blocks, 2] N with which each finger presses each cube."""

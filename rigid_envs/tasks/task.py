@@ -1,12 +1,15 @@
 """What a task is: everything about an environment but the engine, the episode and Gymnasium."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from physics import Readout, Scene, World
+from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward
+from rigid_envs.view import Goal, Sign
 
 Array = np.ndarray
 
@@ -21,6 +24,7 @@ class Task(ABC):
         goal_bounds: likewise of a goal.
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
+        camera: that sees all of the task.
 
     What an instance needs to know beyond its class, as a number of blocks, are arguments of its
     constructor, which gym.make hands on.
@@ -32,6 +36,7 @@ class Task(ABC):
     goal_bounds: tuple[tuple[str, str, float, float], ...]
     draws: int
     reward: Reward
+    camera: Camera = Camera()
 
     @abstractmethod
     def scene(self) -> Scene:
@@ -70,3 +75,7 @@ class Task(ABC):
 
         `apart` [count] m is the distance of the goals, which every reward needs anyway.
         """
+
+    def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
+        """What marks the goal [goal] in a picture of world `index`; by default, a place."""
+        return [Goal(goal[:3], self.reward.threshold)]

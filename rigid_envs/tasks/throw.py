@@ -1,11 +1,15 @@
 """Throw: a hand that holds a ball swings and lets go, to hit a place beyond its reach."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from physics import Body, Fidelity, Ground, Material, Readout, Scene, Sphere, World
+from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.hand import Hand
 from rigid_envs.tasks.task import Task
+from rigid_envs.view import Goal, Mark, Sign
 
 Array = np.ndarray
 
@@ -22,6 +26,8 @@ class Throw(Task):
     """Where the ball first touches the ground counts, and before that, where it is."""
 
     hand = Hand(home=(-0.1, 0.0, 0.25), low=(-0.3, -0.2, 0.1), high=(0.3, 0.2, 0.5), stride=0.12)
+    # from the side for the arc of a throw, and from behind for the fingers
+    camera = Camera((0.4, 0.0, 0.16), 2.2, azimuth=-128.0, elevation=30.0, field_of_view=45.0)
 
     actions = hand.actions
     bounds = (
@@ -98,3 +104,10 @@ class Throw(Task):
         lands = achieved + np.where(landed, 0.0, flight)[:, None] * speed
         lands[:, 2] = RADIUS
         return {"aim": -distance(lands, desired), "landed": landed.astype(float)}
+
+    def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
+        """The target, and a cross where the ball first touched the ground."""
+        spot = goal * (1.0, 1.0, 0.0)
+        shown: list[Sign] = [Goal(spot, THRESHOLD), Goal(spot, 0.3 * THRESHOLD)]
+        landed = world.first_touch_position(BALL, GROUND)[index]
+        return shown if np.isnan(landed).any() else [*shown, Mark(landed, 0.4 * THRESHOLD)]

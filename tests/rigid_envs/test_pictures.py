@@ -1,26 +1,30 @@
 """Environments draw what happens, in a window or not, and can be filmed."""
 
+import itertools
 import os
 import subprocess
 import sys
 import warnings
 
 import gymnasium as gym
+import imageio.v2 as imageio
 import numpy as np
 import pygame
 import pytest
 from gymnasium.wrappers import RecordVideo
 from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
-from rigid_envs.rendering import grid
+from physics import World
+from rigid_envs import scene_view
+from rigid_envs.rendering import Mark, grid
+from rigid_envs.tasks import Push, Stack, Throw, push
+from rigid_envs.view import BODY_COLORS
 from tests.rigid_envs.rollout import (
     IDS,
     PUSH,
     make,
     make_vec,
     random_actions,
-    steps_of,
-    toward_cube,
 )
 
 FRAME = (480, 480, 3)
@@ -32,7 +36,7 @@ def test_a_picture_follows_the_world(env_id):
     env.reset(seed=0)
     before = env.render()
     np.testing.assert_array_equal(env.render(), before)
-    env.step(env.action_space.high)
+    env.step(np.ones(env.action_space.shape))
     after = env.render()
     assert after.shape == FRAME
     assert after.dtype == np.uint8
@@ -91,41 +95,169 @@ def test_a_window_opens_with_the_first_episode_and_closes_with_the_environment(m
     env.close()
 
 
-def test_a_window_shows_the_first_of_many_worlds(monkeypatch):
+def test_a_window_shows_many_worlds_as_a_grid(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    envs = make_vec(3, render_mode="human")
+    envs = make_vec(3, render_mode="human", render_size=64)
     envs.reset(seed=0)
     assert envs.render() is None
-    assert pygame.display.get_init()
+    assert pygame.display.get_surface().get_size() == (128, 128)
     envs.close()
     assert not pygame.display.get_init()
 
 
-def test_an_episode_of_one_world_can_be_filmed(tmp_path):
-    env = gym.make(PUSH, render_mode="rgb_array", max_episode_steps=8)
+def length_and_size(film):
+    """Frames of an mp4, and their width and height."""
+    reader = imageio.get_reader(film, format="FFMPEG")
+    with reader:
+        return reader.count_frames(), reader.get_meta_data()["source_size"]
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_an_episode_of_one_world_can_be_filmed(env_id, tmp_path):
+    env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=8)
     env = RecordVideo(
         env, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True
     )
-    observation, _ = env.reset(seed=0)
+    env.reset(seed=0)
     truncated = False
     while not truncated:
-        observation, _, _, truncated, _ = env.step(toward_cube(observation))
+        truncated = env.step(env.action_space.sample())[3]
     env.close()
-    assert [film.stat().st_size > 0 for film in tmp_path.glob("films/*.mp4")] == [True]
+    (film,) = tmp_path.glob("films/*.mp4")
+    assert length_and_size(film) == (9, (480, 480))  # the start, and a frame a step
 
 
-def test_episodes_of_many_worlds_can_be_filmed(tmp_path):
-    envs = make_vec(4, render_mode="rgb_array", max_episode_steps=8)
+@pytest.mark.parametrize("env_id", IDS)
+def test_episodes_of_many_worlds_can_be_filmed(env_id, tmp_path):
+    envs = make_vec(4, env_id, render_mode="rgb_array", max_episode_steps=8, render_size=160)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         envs = RecordVectorVideo(
             envs, str(tmp_path / "films"), episode_trigger=lambda k: k == 0, disable_logger=True
         )
     envs.reset(seed=0)
-    for _ in steps_of(envs, random_actions(12, 4)):
-        pass
+    for _ in range(12):
+        envs.step(envs.action_space.sample())
     envs.close()
-    assert [film.stat().st_size > 0 for film in tmp_path.glob("films/*.mp4")] == [True]
+    (film,) = tmp_path.glob("films/*.mp4")
+    assert length_and_size(film) == (9, (320, 320))
+
+
+def test_of_many_worlds_the_first_are_drawn():
+    envs = make_vec(40, render_mode="rgb_array", render_size=64, fidelity="fast")
+    envs.reset(seed=0)
+    with pytest.warns(UserWarning, match=r"draws 16 of 40 worlds; render_worlds=\.\.\. draws more"):
+        assert len(envs.render()) == 16
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(envs.render()) == 16  # said once
+    more = make_vec(40, render_mode="rgb_array", render_size=16, render_worlds=20, fidelity="fast")
+    more.reset(seed=0)
+    with pytest.warns(UserWarning, match="draws 20 of 40"):
+        assert len(more.render()) == 20
+
+
+@pytest.mark.parametrize("env_id", IDS)
+@pytest.mark.parametrize("option", ["show_forces", "show_particles"])
+def test_one_world_and_many_draw_alike(env_id, option):
+    """Contact forces of what lies on the ground and in a hand; what solids touch with."""
+    one = make(env_id, render_mode="rgb_array", **{option: True})
+    many = make_vec(2, env_id, render_mode="rgb_array", **{option: True})
+    plain = make(env_id, render_mode="rgb_array")
+    still = np.zeros(one.action_space.shape)
+    still[3:] = -1.0
+    for env in (one, many, plain):
+        env.reset(seed=4)
+        for _ in range(2):
+            env.step(np.stack([still, still]) if env is many else still)
+    np.testing.assert_array_equal(many.render()[0], one.render())
+    assert (one.render() != plain.render()).any()
+
+
+# --- what there is to see ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", [Push(), Stack(5), Throw()], ids=lambda t: type(t).__name__)
+def test_the_camera_sees_the_whole_task(task):
+    world = World(task.scene())
+    draws = np.random.default_rng(0).random((1, 200, task.draws))[0]
+    points = []
+    for row in draws:
+        goal = task.start(world, np.ones(1, dtype=bool), row[None])[0]
+        points += [
+            *world.position[0],
+            *world.drive_position[0],
+            *goal[: len(goal) // 3 * 3].reshape(-1, 3),
+        ]
+    pixels, _ = task.camera.project(np.array(points), 480, 480)
+    assert pixels.min() > 10
+    assert pixels.max() < 470
+
+
+@pytest.mark.parametrize(
+    ("task", "low", "high"),
+    [
+        (Push(), push.LOW, push.HIGH),
+        (Stack(), Stack.hand.low, Stack.hand.high),
+        (Throw(), Throw.hand.low, Throw.hand.high),
+    ],
+    ids=["Push", "Stack", "Throw"],
+)
+def test_the_camera_sees_the_tool_wherever_it_goes(task, low, high):
+    places = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    pixels, _ = task.camera.project(places, 480, 480)
+    assert pixels.min() > 5
+    assert pixels.max() < 475
+
+
+@pytest.mark.parametrize("blocks", [2, 5])
+def test_a_tower_has_a_ghost_for_each_cube_in_its_colour(blocks):
+    env = make("RigidEnvs/Stack-v0", blocks=blocks)
+    env.reset(seed=0)
+    ghosts = scene_view.signs(env._runner, 0)
+    assert [ghost.color for ghost in ghosts] == list(BODY_COLORS[:blocks])
+    heights = [ghost.position[2] for ghost in ghosts]
+    np.testing.assert_allclose(heights, 0.02 + 0.04 * np.arange(blocks), atol=1e-6)
+
+
+def test_a_cross_shows_where_the_ball_landed_and_stays_there():
+    env = make("RigidEnvs/Throw-v0")
+    env.reset(seed=0)
+    assert not any(isinstance(sign, Mark) for sign in scene_view.signs(env._runner, 0))
+    for _ in range(12):  # down and away
+        observation, *_ = env.step(np.array([1.0, 0.0, 0.0, 1.0]))
+    for _ in range(3):
+        (mark,) = [s for s in scene_view.signs(env._runner, 0) if isinstance(s, Mark)]
+        np.testing.assert_allclose(mark.position, observation["achieved_goal"], atol=1e-6)
+        env.step(np.array([1.0, 0.0, 0.0, 1.0]))
+
+
+def test_a_gripper_hangs_from_an_arm_that_follows_its_fingers():
+    env = make("RigidEnvs/Stack-v0")
+    env.reset(seed=0)
+    before = [item.position for item in scene_view.items(env._runner, 0)]
+    env.step(np.array([0.0, 0.0, 1.0, 1.0]))
+    after = [item.position for item in scene_view.items(env._runner, 0)]
+    assert len(after) == 2 + 2 + 4  # cubes, pads, and two fingers, a bar and a post
+    rise = np.array(after)[2:, 2] - np.array(before)[2:, 2]
+    assert rise.min() > 0.01
+    np.testing.assert_allclose(rise, rise[0], atol=1e-9)
+
+
+def test_forces_of_two_solids_are_summed_and_act_on_the_body():
+    env = make("RigidEnvs/Push-v0", fidelity="accurate")
+    env.reset(seed=0)
+    for _ in range(5):
+        env.step(np.zeros(3))
+    (weight,) = scene_view.forces(env._runner, 0)
+    np.testing.assert_allclose(
+        weight.vector, (0, 0, 0.1 * 9.81 * scene_view.FORCE_SCALE), atol=1e-4
+    )
+    np.testing.assert_allclose(weight.origin[:2], env._runner.world.position[0, 0, :2], atol=1e-4)
+    points = scene_view.forces(env._runner, 0, particles=True)
+    assert len(points) > 1
+    total = np.sum([arrow.vector for arrow in points], axis=0)
+    np.testing.assert_allclose(total, weight.vector, atol=1e-12)
 
 
 def test_an_environment_draws_without_a_banner_and_without_a_display():
@@ -141,3 +273,16 @@ def test_an_environment_draws_without_a_banner_and_without_a_display():
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout == ""
+
+
+def test_pygame_is_imported_with_the_first_picture_only():
+    program = (
+        "import sys\n"
+        "import gymnasium as gym\n"
+        f"env = gym.make('rigid_envs:{PUSH}', render_mode='rgb_array', fidelity='fast')\n"
+        "env.reset(seed=0)\n"
+        "assert 'pygame' not in sys.modules\n"
+        "env.render()\n"
+        "assert 'pygame' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

@@ -8,12 +8,22 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
 from physics.shapes import Box, Capsule, Sphere
-from rigid_envs.rendering import TO_LIGHT, Arrow, Camera, Goal, Item, Renderer, grid
+from rigid_envs.rendering import (
+    TO_LIGHT,
+    Arrow,
+    Camera,
+    Ghost,
+    Goal,
+    Item,
+    Mark,
+    Particles,
+    Renderer,
+    grid,
+)
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 RED, GREEN, BLUE = (220, 40, 40), (40, 180, 60), (40, 60, 220)
@@ -27,7 +37,7 @@ def item(shape, position, color=RED, orientation=UPRIGHT):
 
 
 def draw(*items, camera=None, **extras):
-    return Renderer("rgb_array", SIZE, SIZE, camera).frame(items, **extras)
+    return Renderer(SIZE, SIZE, camera).frame(items, **extras)
 
 
 def pixel_of(point, camera=None):
@@ -47,7 +57,7 @@ def is_grey(frame, pixel):
 
 
 def test_a_frame_is_height_by_width_by_three_bytes():
-    frame = Renderer("rgb_array", width=120, height=90).frame([item(CUBE, (0.0, 0.0, 0.02))])
+    frame = Renderer(width=120, height=90).frame([item(CUBE, (0.0, 0.0, 0.02))])
     assert frame.shape == (90, 120, 3)
     assert frame.dtype == np.uint8
 
@@ -57,7 +67,7 @@ def test_an_empty_scene_shows_the_ground():
 
 
 def test_a_later_frame_leaves_an_earlier_one_alone():
-    renderer = Renderer("rgb_array", SIZE, SIZE)
+    renderer = Renderer(SIZE, SIZE)
     first = renderer.frame([item(CUBE, (0.0, 0.0, 0.02))])
     kept = first.copy()
     renderer.frame([item(Sphere(0.1), (0.0, 0.0, 0.1), BLUE)])
@@ -173,7 +183,7 @@ def test_the_shadow_lies_on_the_ground_away_from_the_light():
 
 def test_a_goal_tints_its_disc_and_hangs_a_ball_at_its_height():
     goal = Goal((0.05, 0.05, 0.15), 0.03, GREEN)
-    frame, plain = draw(goals=[goal]), draw()
+    frame, plain = draw(signs=[goal]), draw()
     ball, disc = pixel_of(goal.position), pixel_of((0.04, 0.06, 0.0))
     beside = pixel_of((0.05, -0.02, 0.0))
     for pixel in (ball, disc):
@@ -185,8 +195,52 @@ def test_a_goal_tints_its_disc_and_hangs_a_ball_at_its_height():
 def test_a_solid_shows_through_the_ball_of_its_goal():
     position = (0.0, 0.0, 0.02)
     goal, pixel = Goal(position, 0.05, GREEN), pixel_of(position)
-    alone, solved = draw(goals=[goal]), draw(item(CUBE, position), goals=[goal])
+    alone, solved = draw(signs=[goal]), draw(item(CUBE, position), signs=[goal])
     assert int(solved[pixel][2]) < alone[pixel][2] - 30  # the cube takes the ground's blue
+
+
+def test_a_ghost_tints_its_place_and_shows_its_edges_through_a_solid():
+    place = Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), GREEN)
+    empty, plain = draw(signs=[place]), draw()
+    tint = empty[pixel_of((0.0, 0.0, 0.04))].astype(int) - plain[pixel_of((0.0, 0.0, 0.04))]
+    assert tint[1] > max(tint[0], tint[2]) + 15
+    wall = item(Box((0.05, 0.001, 0.05)), (0.0, -0.04, 0.05))
+    hidden, alone = draw(wall, signs=[place]), draw(wall)
+    corner = np.array([0.02, -0.02, 0.04])
+    assert shows(hidden, pixel_of(corner), GREEN)
+    assert shows(alone, pixel_of(corner), RED)
+
+
+def test_a_cube_in_its_place_keeps_its_colour():
+    place, cube = Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), RED), item(CUBE, (0.0, 0.0, 0.02))
+    pixel = pixel_of((0.0, 0.0, 0.04))
+    np.testing.assert_array_equal(draw(cube, signs=[place])[pixel], draw(cube)[pixel])
+
+
+def test_a_mark_lies_on_the_ground_under_its_position():
+    frame = draw(signs=[Mark((0.05, 0.0, 0.02), 0.02, RED)])
+    assert shows(frame, pixel_of((0.05, 0.0, 0.0)), RED)
+    assert is_grey(frame, pixel_of((0.05, 0.03, 0.0)))
+
+
+def test_particles_stand_where_their_solid_is_turned_to():
+    half = np.sin(np.pi / 4)
+    balls = Particles(np.array([[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]]), 0.01)
+    turned = Item(CUBE, (0.0, 0.0, 0.02), (0.0, 0.0, half, half), RED, balls)
+    frame = draw(turned)
+    for y in (-0.1, 0.1):
+        assert shows(frame, pixel_of((0.0, y, 0.02)), RED)
+        assert is_grey(frame, pixel_of((y, 0.0, 0.02)))
+
+
+def test_the_nearer_particle_hides_the_farther_one():
+    camera, centre = Camera(), np.array([0.0, 0.0, 0.05])
+    towards = (camera.eye - centre) / np.linalg.norm(camera.eye - centre)
+    frames = []
+    for way in (1, -1):
+        balls = Particles(np.array([0.03 * towards, -0.03 * towards])[::way], 0.01)
+        frames.append(draw(Item(CUBE, centre, UPRIGHT, RED, balls)))
+    np.testing.assert_array_equal(*frames)
 
 
 def test_a_force_points_from_its_origin_along_its_vector():
@@ -207,7 +261,7 @@ def test_a_caption_changes_the_top_left_corner_only():
 def test_what_lies_behind_the_camera_is_not_drawn(distance):
     place = distance * Camera().eye * (1.0, 1.0, 1.0 / distance)
     shapes = (Sphere(0.02), CUBE, Capsule(0.02, 0.02))
-    extras = {"goals": [Goal(place, 0.05)], "forces": [Arrow(place, (0.0, 0.1, 0.0))]}
+    extras = {"signs": [Goal(place, 0.05)], "forces": [Arrow(place, (0.0, 0.1, 0.0))]}
     np.testing.assert_array_equal(draw(*[item(s, place) for s in shapes], **extras), draw())
 
 
@@ -237,7 +291,7 @@ def test_a_grid_needs_a_column():
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))])
 def test_a_copied_renderer_draws_the_same(clone):
-    renderer = Renderer("rgb_array", 64, 48, Camera(azimuth=10.0))
+    renderer = Renderer(64, 48, Camera(azimuth=10.0))
     cube = [item(CUBE, (0.0, 0.0, 0.02))]
     np.testing.assert_array_equal(clone(renderer).frame(cube), renderer.frame(cube))
 
@@ -247,11 +301,10 @@ def test_off_screen_frames_need_no_display_and_leave_the_environment_alone():
 import os
 before = dict(os.environ)
 from rigid_envs.rendering import Goal, Renderer
-renderer = Renderer("rgb_array", 32, 24)
-assert renderer.frame([], goals=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
+renderer = Renderer(32, 24)
+assert renderer.frame([], signs=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
 import pygame
 assert not pygame.display.get_init()
-renderer.close()
 sdl = lambda env: {k: v for k, v in env.items() if "SDL" in k or k == "DISPLAY"}
 assert sdl(os.environ) == sdl(before) == {}
 """
@@ -259,36 +312,16 @@ assert sdl(os.environ) == sdl(before) == {}
     subprocess.run([sys.executable, "-c", program], check=True, env=environment, timeout=120)
 
 
-def test_a_window_shows_frames_until_its_user_closes_it(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    renderer = Renderer("human", 64, 48, fps=1000, title="Push")
-    assert renderer.frame([]) is None
-    assert pygame.display.get_caption()[0] == "Push"
-    assert not renderer.closed
-    pygame.event.post(pygame.event.Event(pygame.QUIT))
-    assert renderer.frame([]) is None
-    assert renderer.closed
-    assert not pygame.display.get_init()
-    assert renderer.frame([]) is None
-    assert not pygame.display.get_init()
-    renderer.close()
-
-
 def test_a_missing_pygame_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(DependencyNotInstalled, match=r'pip install "rigid-envs\[render\]"'):
-        Renderer("rgb_array")
+        Renderer()
 
 
-def test_an_unknown_mode_is_named_with_the_valid_ones():
-    with pytest.raises(ValueError, match=r"mode.*human.*rgb_array.*'rgb_arry'"):
-        Renderer("rgb_arry")
-
-
-@pytest.mark.parametrize("field", ["width", "height", "fps"])
-def test_a_size_or_rate_must_be_positive(field):
+@pytest.mark.parametrize("field", ["width", "height"])
+def test_a_size_must_be_positive(field):
     with pytest.raises(ValueError, match=f"{field}.*got 0"):
-        Renderer("rgb_array", **{field: 0})
+        Renderer(**{field: 0})
 
 
 @pytest.mark.parametrize(
@@ -318,10 +351,14 @@ def test_a_pose_that_is_none_is_named(position, orientation, field):
         item(CUBE, position, orientation=orientation)
 
 
-def test_a_goal_or_force_that_is_not_finite_is_named():
+def test_a_sign_or_force_that_is_not_finite_is_named():
     with pytest.raises(ValueError, match=r"Goal\.position"):
         Goal((np.inf, 0.0, 0.0), 0.05)
     with pytest.raises(ValueError, match=r"Goal\.radius"):
         Goal((0.0, 0.0, 0.0), 0.0)
+    with pytest.raises(ValueError, match=r"Ghost\.half_extents"):
+        Ghost((np.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
+    with pytest.raises(ValueError, match=r"Mark\.radius"):
+        Mark((0.0, 0.0, 0.0), 0.0)
     with pytest.raises(ValueError, match=r"Arrow\.vector"):
         Arrow((0.0, 0.0, 0.0), (0.0, 0.0, np.nan))

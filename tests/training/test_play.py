@@ -1,0 +1,236 @@
+"""Play: keys move the tool as its picture shows it, and a window that is closed ends the game."""
+
+import numpy as np
+import pygame
+import pytest
+
+from rigid_envs.tasks import Push, Stack, Throw
+from rigid_envs.window import Key, Window
+from training import cli
+from training.environments import make_single_env
+from training.errors import UsageError
+from training.play import FAST_PACE, MOVES, PACE, Game, action_of, play
+
+PUSH, STACK, THROW = (f"RigidEnvs/{name}-v0" for name in ("Push", "Stack", "Throw"))
+ALONG_X = -90.0  # azimuth at which x points to the right of a picture and y into it
+
+
+@pytest.fixture
+def game():
+    games = []
+
+    def make(env_id, **arguments):
+        env = make_single_env(env_id, fidelity="fast", **arguments)
+        games.append(Game(env, 3))
+        return games[-1]
+
+    yield make
+    for one in games:
+        one.env.close()
+
+
+# --- keys ---------------------------------------------------------------------------------------
+
+
+def test_no_key_moves_nothing():
+    assert action_of([], 3, closed=False, azimuth=ALONG_X).tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("key", MOVES)
+def test_a_key_moves_the_tool_as_the_picture_shows_it(key):
+    action = action_of([key], 3, closed=False, azimuth=ALONG_X)
+    np.testing.assert_allclose(action, PACE * np.array(MOVES[key]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("task", [Push(), Stack(), Throw()], ids=lambda t: type(t).__name__)
+@pytest.mark.parametrize("key", ["right", "left", "up", "down", "r", "f"])
+def test_keys_go_within_45_degrees_of_where_they_point(key, task):
+    right, _, forward = task.camera.axes
+    away = forward * (1.0, 1.0, 0.0) / np.hypot(*forward[:2])
+    pointed = np.array(MOVES[key]) @ np.stack([right, away, (0.0, 0.0, 1.0)])
+    move = action_of([key], 3, closed=False, azimuth=task.camera.azimuth)
+    assert move @ pointed > np.cos(np.radians(45.0)) * PACE
+
+
+def test_keys_add_up_and_opposite_ones_cancel():
+    both = action_of(["right", "up"], 3, closed=False, azimuth=ALONG_X)
+    np.testing.assert_allclose(both, [PACE, PACE, 0.0], rtol=1e-6)
+    assert not action_of(["left", "right"], 3, closed=False, azimuth=ALONG_X).any()
+
+
+def test_two_keys_of_one_way_are_no_faster_than_one():
+    one, two = (action_of(k, 3, closed=False, azimuth=ALONG_X) for k in (["a"], ["a", "left"]))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_shift_is_fast():
+    fast = action_of(["right", "left shift"], 3, closed=False, azimuth=ALONG_X)
+    np.testing.assert_allclose(fast, [FAST_PACE, 0.0, 0.0])
+
+
+def test_the_grip_is_the_last_component():
+    assert action_of([], 4, closed=True, azimuth=ALONG_X)[3] == -1.0
+    assert action_of([], 4, closed=False, azimuth=ALONG_X)[3] == 1.0
+
+
+def test_other_keys_do_nothing():
+    assert not action_of(["q", "tab"], 3, closed=False, azimuth=ALONG_X).any()
+
+
+# --- game ---------------------------------------------------------------------------------------
+
+
+def test_a_key_counts_as_long_as_it_is_down(game):
+    playing = game(PUSH)
+    playing.press([Key("right", True)])
+    playing.step()
+    assert playing.held == {"right"}
+    playing.press([Key("right", False)])
+    assert playing.held == set()
+    assert playing.steps == 1
+
+
+@pytest.mark.parametrize(("env_id", "closed"), [(PUSH, False), (STACK, False), (THROW, True)])
+def test_a_hand_that_holds_something_starts_closed(game, env_id, closed):
+    assert game(env_id).closed is closed
+
+
+def test_space_lets_the_ball_go(game):
+    playing = game(THROW)
+    heights = []
+    for keys in ([], [Key("space", True), Key("space", False)]):
+        playing.press(keys)
+        for _ in range(8):
+            playing.step()
+        heights.append(playing.env.unwrapped._runner.world.position[0, 0, 2])
+    assert heights[0] > 0.2
+    assert heights[1] < 0.1
+    assert not playing.closed
+
+
+@pytest.mark.parametrize("key", ["n", "backspace"])
+def test_a_new_episode_begins_on_request(game, key):
+    playing = game(PUSH)
+    goal = playing.env.unwrapped._runner.goals.copy()
+    playing.step()
+    playing.press([Key(key, True)])
+    assert (playing.steps, playing.total) == (0, 0.0)
+    assert (playing.env.unwrapped._runner.goals != goal).any()
+
+
+def test_an_episode_that_ends_is_followed_by_the_next(game):
+    playing = game(PUSH, max_episode_steps=2)
+    for _ in range(3):
+        playing.step()
+    assert playing.steps == 1
+
+
+def test_the_text_tells_step_reward_and_success(game):
+    playing = game(PUSH)
+    playing.step()
+    assert "step 1" in playing.text[0]
+    assert "reward -1.00" in playing.text[0]
+    assert "SOLVED" not in playing.text[0]
+    runner = playing.env.unwrapped._runner
+    runner.world.set_state(position=runner.goals[:, None].astype(float))
+    playing.step()
+    assert "SOLVED" in playing.text[0]
+
+
+# --- window -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def keyboard(monkeypatch):
+    """Posts pygame events before the nth picture is shown, by n; lists the texts under "shown"."""
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    script = {"shown": (shown := [])}
+    show = Window.show
+
+    def scripted(window, picture, text=()):
+        shown.append(text)
+        if window._surface is None:
+            window._open()
+            pygame.event.clear()
+        for event in script.get(len(shown), []):
+            pygame.event.post(event)
+        return show(window, picture, text)
+
+    monkeypatch.setattr(Window, "show", scripted)
+    return script
+
+
+def down(key):
+    return pygame.event.Event(pygame.KEYDOWN, key=key)
+
+
+SMALL = {"fidelity": "fast", "fps": 1000.0, "render_size": 64}
+
+
+def test_closing_the_window_ends_the_game(keyboard):
+    keyboard[4] = [pygame.event.Event(pygame.QUIT)]
+    assert play(PUSH, seed=0, **SMALL) == 3
+    assert not pygame.display.get_init()
+
+
+def test_escape_ends_the_game(keyboard):
+    keyboard[2] = [down(pygame.K_ESCAPE)]
+    assert play(PUSH, seed=0, **SMALL) == 1
+    assert not pygame.display.get_init()
+
+
+def test_keys_reach_the_environment(keyboard):
+    keyboard[1], keyboard[3] = [down(pygame.K_LEFT)], [down(pygame.K_n)]
+    keyboard[5] = [down(pygame.K_ESCAPE)]
+    assert play(STACK, seed=0, blocks=3, **SMALL) == 4
+    steps = [text[0].split()[1] for text in keyboard["shown"]]
+    assert steps == ["0", "1", "2", "1", "2"]
+
+
+def test_an_episode_has_no_limit_of_steps_unless_asked_for(keyboard):
+    keyboard[60] = [down(pygame.K_ESCAPE)]
+    play(PUSH, seed=0, **SMALL)
+    assert keyboard["shown"][-1][0].startswith("step 59 ")
+
+
+def test_without_a_display_there_is_no_game(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
+    with pytest.raises(UsageError, match="no window can be opened"):
+        play(PUSH, **SMALL)
+
+
+# --- command ------------------------------------------------------------------------------------
+
+
+def test_the_command_takes_what_the_environment_does(keyboard, capsys):
+    keyboard[1] = [down(pygame.K_ESCAPE)]
+    words = ["play", STACK, "--blocks", "3", "--fidelity", "fast", "--seed", "1"]
+    words += ["--reward", "dense", "--show-forces", "--show-particles"]
+    assert cli.main([*words, "--env-kwargs", "render_size:64"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["RigidEnvs/Pusj-v0"], "did you mean 'RigidEnvs/Push-v0'"),
+        (["--blocks", "3"], "unknown argument 'blocks'"),
+        (["--reward", "shaped"], "invalid choice: 'shaped'"),
+        (["--fidelity", "lavish"], "lavish"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(words, complaint, capsys):
+    assert cli.main(["play", *words]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("error: ")
+    assert told.count("\n") == 1
+    assert complaint in told
+
+
+def test_playing_needs_pygame_alone(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "TRAIN_EXTRA", ("no_such_package",))
+    monkeypatch.setattr(cli, "RENDER_EXTRA", ("no_such_pygame",))
+    assert cli.main(["play"]) == 2
+    assert capsys.readouterr().err == (
+        'error: this command needs no_such_pygame: pip install "rigid-envs[render]"\n'
+    )
