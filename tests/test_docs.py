@@ -19,6 +19,7 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     known = set(gym.registry)
     code = "\n".join(BLOCK.findall(page.read_text()))
+    code = code.replace("learn(1_000_000)", "learn(51_200)")  # a round: enough to see that it runs
     try:
         exec(compile(code, str(page), "exec"), {"__name__": "page"})
     finally:
