@@ -1,11 +1,11 @@
-"""Speed of Push, beside bare MuJoCo in the same run.
+"""Speed of the environments, beside bare MuJoCo in the same run.
 
-Ours is the whole environment: RigidEnvs/Push-v0 by make_vec, 4,096 worlds, dense reward, random
-actions, balanced, with observation, reward and autoreset. The peer is physics alone, no task and
-no Python in the loop: the same cube, ground and finger ball in MuJoCo at 2 ms, 20 steps to an
-environment step, the finger led along paths that random actions take in our own environment, from
-the same starts. Two threads each. Sides take turns; rates are medians of the rounds, and the last
-two columns are the lowest and the highest ratio within a round.
+Ours is the whole environment by make_vec, 4,096 worlds, dense reward, random actions, balanced,
+with observation, reward and autoreset. The peer is physics alone, no task and no Python in the
+loop: the same bodies, ground and tools in MuJoCo at 2 ms, 20 steps to an environment step, the
+tools led along paths that random actions take in our own environment, from the same starts. Two
+threads each. Sides take turns; rates are medians of the rounds, and the last two columns are the
+lowest and the highest ratio within a round.
 """
 
 import argparse
@@ -25,9 +25,15 @@ from benchmarks.mujoco_scene import model_of
 from benchmarks.report import THREADS, Cell, Table, against, clocked, main, rate, take_turns
 from physics import PRESETS, World
 from rigid_envs import Runner
-from rigid_envs.tasks import Push
+from rigid_envs.tasks import TASKS, Push
 
-ID = "RigidEnvs/Push-v0"
+# what is asked for, by task
+BARS = {
+    "push": "600,000; target 1,000,000 and 50 ×",
+    "stack": "150,000; target 300,000 and 25 ×",
+    "throw": "600,000; target 1,000,000 and 50 ×",
+}
+ALONE = "20,000"  # of Push by gym.make
 WORLDS = 4096
 EPISODE = 50  # environment steps
 SUBSTEPS = 20  # of MuJoCo in an environment step
@@ -38,12 +44,23 @@ Array = np.ndarray
 Side = Callable[[], int]
 
 
-def push(fidelity: str, worlds: int = WORLDS) -> Side:
+def id_of(task: str) -> str:
+    """The environment of a task."""
+    return f"RigidEnvs/{task.capitalize()}-v0"
+
+
+def batch(task: str, fidelity: str, worlds: int = WORLDS) -> Side:
     """An episode of the vector environment a call, and the step in which all worlds reset."""
     envs = gym.make_vec(
-        ID, num_envs=worlds, reward_type="dense", fidelity=fidelity, threads=THREADS
+        id_of(task),
+        num_envs=worlds,
+        reward_type="dense",
+        fidelity=fidelity,
+        threads=THREADS,
+        max_episode_steps=EPISODE,
     )
-    actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, worlds, 3)).astype(np.float32)
+    size = envs.single_action_space.shape or ()
+    actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, worlds, *size)).astype(np.float32)
     envs.reset(seed=0)
 
     def episode() -> int:
@@ -57,7 +74,7 @@ def push(fidelity: str, worlds: int = WORLDS) -> Side:
 
 def push_alone(fidelity: str = "balanced") -> Side:
     """An episode of the single environment a call, reset included."""
-    env = gym.make(ID, reward_type="dense", fidelity=fidelity)
+    env = gym.make(id_of("push"), reward_type="dense", fidelity=fidelity)
     actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, 3)).astype(np.float32)
 
     def episode() -> int:
@@ -71,52 +88,54 @@ def push_alone(fidelity: str = "balanced") -> Side:
     return episode
 
 
-def episode_of(worlds: int, fidelity: str = "balanced") -> tuple[World, Array, Array, Array]:
-    """An episode of Push under random actions.
+def episode_of(
+    task: str, worlds: int, fidelity: str = "balanced"
+) -> tuple[World, Array, Array, Array]:
+    """An episode under random actions.
 
     Returns:
-        The world at its end; the cubes' first positions [worlds, 3] and orientations [worlds, 4];
-        and the fingers' paths [worlds, EPISODE + 1, 3] in m.
+        The world at its end; the bodies' first positions [worlds, bodies, 3] and orientations
+        [worlds, bodies, 4]; and the tools' paths [worlds, EPISODE + 1, tools, 3] in m.
     """
-    runner, rng = Runner(Push(), worlds, "dense", fidelity, THREADS), np.random.default_rng(0)
+    runner, rng = Runner(task, worlds, "dense", fidelity, THREADS), np.random.default_rng(0)
     runner.reset(np.ones(worlds, dtype=bool), np.arange(worlds))
     world = runner.world
-    position, orientation = world.position[:, 0].copy(), world.orientation[:, 0].copy()
-    path = [world.drive_position[:, 0].copy()]
+    position, orientation = world.position.copy(), world.orientation.copy()
+    path = [world.drive_position.copy()]
     for _ in range(EPISODE):
-        runner.step(rng.uniform(-1, 1, (worlds, 3)))
-        path.append(world.drive_position[:, 0].copy())
+        runner.step(rng.uniform(-1, 1, (worlds, len(runner.task.actions))))
+        path.append(world.drive_position.copy())
     return world, position, orientation, np.stack(path, axis=1)
 
 
-def mujoco_sides(worlds: int = 256) -> dict[str, Side]:
+def mujoco_sides(task: str, worlds: int = 256) -> dict[str, Side]:
     """An episode a call of mujoco.rollout, and of mujoco.batch that gets a path step by step.
 
     Fewer worlds than ours: MuJoCo's rate doesn't depend on them, and paths and states stay small.
     """
-    task = Push()
-    _, position, orientation, path = episode_of(worlds)
-    model = model_of(task.scene(), task.frame / SUBSTEPS, cone="pyramidal")
+    world, position, orientation, path = episode_of(task, worlds)
+    model = model_of(world.scene, TASKS[task].frame / SUBSTEPS, cone="pyramidal")
     state = np.zeros((worlds, 1 + model.nq + model.nv))
-    state[:, 1:8] = np.hstack([position, np.roll(orientation, 1, axis=1)])
-    share = np.arange(1, SUBSTEPS + 1)[:, None] / SUBSTEPS
+    pose = np.concatenate([position, np.roll(orientation, 1, axis=-1)], axis=-1)
+    state[:, 1 : 1 + model.nq] = pose.reshape(worlds, -1)
+    share = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
     control = path[:, :-1, None] + share * np.diff(path, axis=1)[:, :, None]
-    control = control.reshape(worlds, EPISODE * SUBSTEPS, 3)
+    control = control.reshape(worlds, EPISODE * SUBSTEPS, -1)
     room = np.empty((worlds, EPISODE * SUBSTEPS, state.shape[1]))
     pool, data = rollout.Rollout(nthread=THREADS), [MjData(model) for _ in range(THREADS)]
     spec = int(mjtState.mjSTATE_MOCAP_POS)
-    batch = Batch(model, nsim=worlds, nthread=THREADS)
+    many = Batch(model, nsim=worlds, nthread=THREADS)
 
     def roll() -> int:
         pool.rollout(model, data, state, control, control_spec=spec, state=room)
         return worlds * EPISODE
 
     def step() -> int:
-        batch.reset()
-        batch.qpos = state[:, 1:8]
+        many.reset()
+        many.qpos = state[:, 1 : 1 + model.nq]
         for frame in range(EPISODE):
-            batch.mocap_pos = path[:, frame + 1, None]
-            batch.step(nstep=SUBSTEPS)
+            many.mocap_pos = path[:, frame + 1]
+            many.step(nstep=SUBSTEPS)
         return worlds * EPISODE
 
     return {PEER: roll, "MuJoCo: batch": step}
@@ -142,27 +161,30 @@ def panda(python: Path) -> Side:
     return turn
 
 
-def beside_peers(panda_python: Path | None) -> Iterator[Table]:
-    """Batch and single environment against the peers."""
-    many, alone = f"{ID}, {WORLDS:,} worlds", f"{ID}, gym.make"
-    bars = {many: "600,000; target 1,000,000 and 50 ×", alone: "20,000"}
-    sides = {many: push("balanced"), **mujoco_sides(), alone: push_alone()}
-    if panda_python:
-        sides["panda-gym: PandaPush-v3"] = panda(panda_python)
+def beside_peers(task: str, panda_python: Path | None = None) -> Table:
+    """Batch and, of Push, single environment against the peers."""
+    many, alone = f"{id_of(task)}, {WORLDS:,} worlds", f"{id_of(task)}, gym.make"
+    bars = {many: BARS[task], alone: ALONE}
+    sides = {many: batch(task, "balanced"), **mujoco_sides(task)}
+    if task == "push":
+        sides[alone] = push_alone()
+        if panda_python:
+            sides["panda-gym: PandaPush-v3"] = panda(panda_python)
     rates = take_turns(sides, ROUNDS, SECONDS)
     rows = [[name, bars.get(str(name)), *rest] for name, *rest in against(rates, PEER)]
     columns = ["env steps a second", "bar", "median", f"ratio to {PEER}", "lowest", "highest"]
-    yield Table("speed", "Push, balanced, 20 substeps of 2 ms", columns, rows)
+    name = "speed" if task == "push" else f"speed_{task}"
+    return Table(name, f"{task.capitalize()}, balanced, 20 substeps of 2 ms", columns, rows)
 
 
 def by_preset() -> Iterator[Table]:
     """What each preset costs, where its time goes, and how near its step is to the limit."""
     rows: list[list[Cell]] = []
     for preset, fidelity in PRESETS.items():
-        side = push(preset)
+        side = batch("push", preset)
         side()
         worst, touching, looked_at = np.inf, 0, 64
-        world = episode_of(looked_at, preset)[0]
+        world = episode_of("push", looked_at, preset)[0]
         for w in range(looked_at):
             worst = min(worst, world.largest_stable_step(w))
             touching += len(world.contacts(w).overlap)
@@ -180,7 +202,8 @@ def by_preset() -> Iterator[Table]:
 
 def measure(panda_python: Path | None = None) -> Iterator[Table]:
     """All tables of this module."""
-    yield from beside_peers(panda_python)
+    for task in BARS:
+        yield beside_peers(task, panda_python)
     yield from by_preset()
 
 

@@ -14,7 +14,7 @@ from physics.jit import LANES, SOURCES, entry, kernel, stage
 from physics.pipeline import make_substep
 from physics.readout import make_write_rows
 from physics.stages.candidates import make_forget
-from physics.stages.kinematics import place_statics
+from physics.stages.kinematics import place_statics, place_tools
 
 # m, kg m/s or kg m^2/s in sum: beyond it a mover counts as diverged
 LARGEST = 1e50
@@ -86,6 +86,7 @@ def make_advance(features: Features):
             if load(model, state, work, chosen, g) == 0:
                 continue
             place_statics(model, work)  # a group that diverged leaves nothing for the next
+            place_tools(model, work)
             lane, stale = work.lane[0], 0
             for i in range(LANES):
                 stale += lane.stale[i]

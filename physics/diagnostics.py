@@ -14,7 +14,7 @@ from physics.model import Model
 from physics.rotation import rotation_matrix
 from physics.shapes import PLANE
 from physics.stages.contacts import REPORT, make_side
-from physics.stages.kinematics import make_kinematics, place_statics
+from physics.stages.kinematics import make_kinematics, place_statics, place_tools
 from physics.stages.points import make_points
 from physics.state import State
 
@@ -75,6 +75,7 @@ def _make_report(features: Features) -> Any:
         _ = sources
         place_statics(model, work)
         load(model, state, work, chosen, 0)
+        place_tools(model, work)
         kinematics(model, work)
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:

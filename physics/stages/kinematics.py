@@ -44,6 +44,18 @@ def place_statics(model, work):
 
 
 @stage
+def place_tools(model, work):
+    """Writes what never changes of the tools, once for all steps: they may stand askew."""
+    for m in range(model.mover.shape[0]):
+        if not model.mover[m].turns:
+            solid = work.solid[m]
+            for i in range(LANES):
+                for c in range(3):
+                    solid.spin[c, i] = 0.0
+                place(solid, i)
+
+
+@stage
 def turned(R, i, x, y, z):
     """A vector of the frame R of lane i in the world frame."""
     return (
@@ -94,14 +106,10 @@ def make_kinematics(features):
                 v[0, i] = inverse_mass * P[0, i]
                 v[1, i] = inverse_mass * P[1, i]
                 v[2, i] = inverse_mass * P[2, i]
-            for i in range(LANES):
-                place(solid, i)  # a drive's too: it never turns, but may stand askew
-            if not constants.turns:
-                for i in range(LANES):
-                    omega[0, i] = 0.0
-                    omega[1, i] = 0.0
-                    omega[2, i] = 0.0
+            if not constants.turns:  # see place_tools
                 continue
+            for i in range(LANES):
+                place(solid, i)
             for i in range(LANES):
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
                 if rotation == NO_ROTATION:
