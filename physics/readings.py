@@ -26,6 +26,7 @@ class Readings:
     count: int
     _bodies: int
     _model: Model
+    _base: Model
     _features: Features
     _state: State
     _rows: Array
@@ -38,8 +39,16 @@ class Readings:
 
     @property
     def _inverse_mass(self) -> Array:
-        """Inverse masses [bodies]."""
-        return self._model.mover["inverse_mass"][: self._bodies]
+        """Inverse masses of the bodies, [bodies] or of each world [count, bodies]."""
+        return self._of_movers("inverse_mass")[..., : self._bodies]
+
+    def _of_movers(self, name: str) -> Array:
+        """A field of the model's movers, [movers, ...] or of each world [count, movers, ...]."""
+        rows = self._model.mover[name]
+        if self._model.mover.ndim == 1:
+            return rows
+        worlds = np.moveaxis(rows, -1, 1)
+        return worlds.reshape(-1, *worlds.shape[2:])[: self.count]
 
     def _read(self, values: Array) -> Array:
         view = values[:]
@@ -70,7 +79,7 @@ class Readings:
     def linear_velocity(self) -> Array:
         """[count, bodies, 3] m/s, world frame."""
         return self._read(
-            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[:, None]
+            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[..., None]
         )
 
     @property
@@ -78,7 +87,7 @@ class Readings:
         """[count, bodies, 3] rad/s, world frame."""
         momentum = self._state.mover["angular_momentum"][:, : self._bodies]
         turn = self._state.mover["orientation"][:, : self._bodies]
-        inverse = self._model.mover["inverse_inertia"][: self._bodies]
+        inverse = self._of_movers("inverse_inertia")[..., : self._bodies, :]
         if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
             return self._read(inverse * momentum)
         return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
@@ -91,7 +100,7 @@ class Readings:
     @property
     def drive_velocity(self) -> Array:
         """[count, tools, 3] m/s, world frame."""
-        inverse = self._model.mover["inverse_mass"][self._bodies :]
+        inverse = self._base.mover["inverse_mass"][self._bodies :]
         return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
 
     @property
@@ -109,15 +118,18 @@ class Readings:
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""
         momentum = self._state.mover["momentum"][:, : self._bodies]
-        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._inverse_mass)
+        inverse = self._inverse_mass
+        axes = "wbi,wbi,b->w" if inverse.ndim == 1 else "wbi,wbi,wb->w"
+        translation = np.einsum(axes, momentum, momentum, inverse)
         angular = self._state.mover["angular_momentum"][:, : self._bodies]
         rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
         return 0.5 * (translation + rotation)
 
     def potential_energy(self) -> Array:
         """[count] J of the bodies in the field of gravity, zero at the origin."""
-        weight = self._model.mover["weight"][: self._bodies]
-        return -np.einsum("wbi,bi->w", self._state.mover["position"][:, : self._bodies], weight)
+        weight = self._of_movers("weight")[..., : self._bodies, :]
+        axes = "wbi,bi->w" if weight.ndim == 2 else "wbi,wbi->w"
+        return -np.einsum(axes, self._state.mover["position"][:, : self._bodies], weight)
 
     def linear_momentum(self) -> Array:
         """[count, 3] kg m/s of the bodies."""
@@ -152,7 +164,7 @@ class Readings:
         """
         ends = self._pair(first, second)
         self._settle()
-        return diagnostics.first_touch(self._model, self._state, *ends)
+        return diagnostics.first_touch(self._base, self._state, *ends)
 
     def first_touch_position(self, first: int, second: int) -> Array:
         """[count, 3] m, where the centre of one of two solids was at their first touch; NaN before.
@@ -168,13 +180,13 @@ class Readings:
                 f"{ends[1]}"
             )
         self._settle()
-        return diagnostics.first_touch_position(self._model, self._state, *ends)
+        return diagnostics.first_touch_position(self._base, self._state, *ends)
 
     def pressing(self, first: int, second: int) -> Array:
         """[count] N, the sum of the normal forces between two solids, as in `first_touch`."""
         ends = self._pair(first, second)
         self._settle()
-        return diagnostics.pressing(self._model, self._state, *ends)
+        return diagnostics.pressing(self._base, self._state, *ends)
 
     def _pair(self, first: int, second: int) -> tuple[int, int]:
         """Two solids that can meet."""
@@ -186,7 +198,7 @@ class Readings:
                     f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
                     f"statics), got {value}"
                 )
-        if not diagnostics.between(self._model, *ends).any():
+        if not diagnostics.between(self._base, *ends).any():
             raise ValueError(
                 f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
                 "one solid, or two statics, never do"
@@ -202,8 +214,9 @@ class Readings:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of state a world, beyond the shared model."""
-        return self._state.nbytes // self.count
+        """Bytes of state a world, beyond the shared model; of varied worlds with their own."""
+        own = self._model.nbytes if self._features.varied else 0
+        return (self._state.nbytes + own) // self.count
 
     def _world_index(self, world: int) -> int:
         index = integer("world", world, low=0)

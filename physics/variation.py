@@ -1,0 +1,157 @@
+"""Worlds that differ: masses, friction, restitution and sizes of their own."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from physics.features import Features
+from physics.fidelity import Fidelity
+from physics.layout import Layout
+from physics.limits import check_range, check_world
+from physics.model import Model, vary
+from physics.parameters import Parameters, check_ranges, check_values
+from physics.readings import Readings
+from physics.rotation import rotate, rotate_back
+from physics.scene import Scene
+
+Array = np.ndarray
+
+
+class Variation(Readings):
+    """The half of a World that holds its parameters; a World makes all that is named here."""
+
+    scene: Scene
+    fidelity: Fidelity
+    _model: Model
+    _features: Features
+    _layout: Layout | None
+    _parameters: Parameters  # [count, bodies]; of worlds that are alike [1, bodies]
+    _checked: tuple[Parameters, Parameters] | None  # [1, bodies] each: a range that is safe
+    _everyone: Array
+    _allow_unstable: bool
+
+    def _mask(self, worlds: Any) -> Array:
+        """A mask [count] of the worlds that are meant."""
+        raise NotImplementedError
+
+    def _forget(self, worlds: Array) -> None:
+        """Clears what is hidden."""
+        raise NotImplementedError
+
+    @property
+    def parameters(self) -> Parameters:
+        """A copy of the bodies' parameters, [count, bodies] each."""
+        shape = (self.count, self._bodies)
+        return Parameters(*(np.broadcast_to(values, shape).copy() for values in self._parameters))
+
+    def check_parameters(self, ranges: Mapping[str, Any]) -> None:
+        """Refuses ranges that hold parameters which the step is too long for.
+
+        The ends of the ranges are looked at: all bodies at one, and each in turn at the other.
+        What `set_parameters` writes within ranges that were checked needs no check of its own.
+
+        Args:
+            ranges: low and high of "mass", "friction", "restitution" or "size": numbers, or
+                [bodies] each. What isn't named is as in the scene.
+
+        Raises:
+            TypeError, ValueError: no such parameter, or no such range; a range that is unstable or
+                lets a body sink, with what binds and the largest safe step.
+        """
+        low, high = check_ranges(ranges, Parameters.of(self.scene))
+        if not self._allow_unstable:
+            check_range(self.scene, self.fidelity, low, high)
+        self._checked = low, high
+
+    def set_parameters(
+        self,
+        *,
+        mass: Any = None,
+        friction: Any = None,
+        restitution: Any = None,
+        size: Any = None,
+        worlds: Any = None,
+    ) -> None:
+        """Gives the chosen worlds parameters of their own, and clears what is hidden in them.
+
+        Positions and velocities stay; `reset` and `set_state` then start from the new parameters
+        to the last bit. `reset` keeps parameters, `snapshot` holds them.
+
+        Args:
+            mass: kg, [chosen, bodies] or what broadcasts to it, as the others.
+            friction: of the bodies' material.
+            restitution: of the bodies' material, 0 to 1.
+            size: factor of every length of a body's shape, 1 as in the scene. A body keeps the
+                samples that it has there, so sizes can't be worlds apart.
+            worlds: mask [count] of the chosen worlds; all if None.
+
+        Raises:
+            ValueError: the World isn't `varied`; a wrong shape, a value out of its limits, or one
+                that the step is too long for. The parameters are then as they were.
+        """
+        if self._layout is None:
+            raise ValueError(
+                "set_parameters needs worlds that may differ: build the World with varied=True"
+            )
+        mask = self._mask(worlds)
+        chosen = np.flatnonzero(mask)
+        given = {"mass": mass, "friction": friction, "restitution": restitution, "size": size}
+        values = check_values(given, chosen, self._bodies)
+        if not values or not len(chosen):
+            return
+        before = self._parameters.pick(mask)
+        new = before._replace(**values)
+        if not self._allow_unstable:
+            self._check_new(new, chosen)
+        velocity, spin = self.linear_velocity[mask], self.angular_velocity[mask]
+        self._write_parameters(mask, new)
+        mover, bodies = self._state.mover, slice(0, self._bodies)
+        heavier = (new.mass != before.mass)[..., None]
+        momentum = velocity / self._inverse_mass[mask][..., None]
+        mover["momentum"][mask, bodies] = np.where(
+            heavier, momentum, mover["momentum"][mask, bodies]
+        )
+        turned = self._spin_momentum(mask, mover["orientation"][mask, bodies], spin)
+        mover["angular_momentum"][mask, bodies] = np.where(
+            heavier | (new.size != before.size)[..., None],
+            turned,
+            mover["angular_momentum"][mask, bodies],
+        )
+        self._forget(mask)
+
+    def _check_new(self, new: Parameters, worlds: Array) -> None:
+        """Refuses parameters [n, bodies] of the worlds [n] that the step is too long for."""
+        low, high = (
+            Parameters(*(end(values, axis=0, keepdims=True) for values in new))
+            for end in (np.min, np.max)
+        )
+        if self._checked is not None:
+            safe = zip(low, self._checked[0], self._checked[1], high, strict=True)
+            if all((a <= b).all() and (d <= c).all() for b, a, c, d in safe):
+                return
+        try:  # all at once; should that fail, it may be for two that never meet
+            check_range(self.scene, self.fidelity, low, high)
+        except ValueError:
+            for i, world in enumerate(worlds.tolist()):
+                check_world(self.scene, self.fidelity, new.pick([i]), world)
+        else:
+            self._checked = low, high
+
+    def _write_parameters(self, mask: Array, new: Parameters) -> None:
+        """Writes parameters [n, bodies] of the worlds of a mask, and what follows from them."""
+        assert self._layout is not None
+        for mine, values in zip(self._parameters, new, strict=True):
+            mine[mask] = values
+        vary(self._model, self._layout, np.flatnonzero(mask), new)
+
+    def _spin_momentum(self, worlds: Array, orientation: Array, spin: Array) -> Array:
+        """L = R J0 R^T omega [chosen, bodies, 3] of the bodies of some worlds."""
+        inertia = self._of_movers("inertia")[..., : self._bodies, :]
+        inertia = inertia[worlds] if self._features.varied else inertia
+        return spin_momentum(inertia, orientation, spin)
+
+
+def spin_momentum(inertia: Array, orientation: Array, spin: Array) -> Array:
+    """L = R J0 R^T omega, [..., 3], of principal moments [..., 3]."""
+    return rotate(orientation, inertia * rotate_back(orientation, spin))
