@@ -8,6 +8,7 @@ from physics import diagnostics, stability
 from physics.diagnostics import Contacts
 from physics.features import ISOTROPIC, Features
 from physics.fidelity import Fidelity
+from physics.jit import LANES
 from physics.model import Model
 from physics.readout import Readout
 from physics.rotation import rotate, rotate_back
@@ -40,15 +41,18 @@ class Readings:
     @property
     def _inverse_mass(self) -> Array:
         """Inverse masses of the bodies, [bodies] or of each world [count, bodies]."""
-        return self._of_movers("inverse_mass")[..., : self._bodies]
+        return self._of_bodies("inverse_mass", np.arange(self.count))
 
-    def _of_movers(self, name: str) -> Array:
-        """A field of the model's movers, [movers, ...] or of each world [count, movers, ...]."""
+    def _of_bodies(self, name: str, worlds: Array) -> Array:
+        """A field of the model's bodies: [bodies, ...], or [n, bodies, ...] of varied worlds [n].
+
+        Both go with an array [n, bodies, ...].
+        """
         rows = self._model.mover[name]
         if self._model.mover.ndim == 1:
-            return rows
-        worlds = np.moveaxis(rows, -1, 1)
-        return worlds.reshape(-1, *worlds.shape[2:])[: self.count]
+            return rows[: self._bodies]
+        group, lane = np.divmod(worlds, LANES)
+        return rows[group, ..., lane][:, : self._bodies]
 
     def _read(self, values: Array) -> Array:
         view = values[:]
@@ -87,10 +91,15 @@ class Readings:
         """[count, bodies, 3] rad/s, world frame."""
         momentum = self._state.mover["angular_momentum"][:, : self._bodies]
         turn = self._state.mover["orientation"][:, : self._bodies]
-        inverse = self._of_movers("inverse_inertia")[..., : self._bodies, :]
+        inverse = self._of_bodies("inverse_inertia", np.arange(self.count))
+        return self._read(self._spin(inverse, turn, momentum))
+
+    def _spin(self, inverse_inertia: Array, orientation: Array, momentum: Array) -> Array:
+        """Angular velocity [..., 3] of an angular momentum."""
         if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
-            return self._read(inverse * momentum)
-        return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
+            return np.asarray(inverse_inertia * momentum)
+        turned = inverse_inertia * rotate_back(orientation, momentum)
+        return np.asarray(rotate(orientation, turned))
 
     @property
     def drive_position(self) -> Array:
@@ -127,7 +136,7 @@ class Readings:
 
     def potential_energy(self) -> Array:
         """[count] J of the bodies in the field of gravity, zero at the origin."""
-        weight = self._of_movers("weight")[..., : self._bodies, :]
+        weight = self._of_bodies("weight", np.arange(self.count))
         axes = "wbi,bi->w" if weight.ndim == 2 else "wbi,wbi->w"
         return -np.einsum(axes, self._state.mover["position"][:, : self._bodies], weight)
 

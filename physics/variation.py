@@ -104,20 +104,21 @@ class Variation(Readings):
         new = before._replace(**values)
         if not self._allow_unstable:
             self._check_new(new, chosen)
-        velocity, spin = self.linear_velocity[mask], self.angular_velocity[mask]
+        rows = self._state.mover[mask, : self._bodies]  # a copy
+        momentum, turning, orientation = (
+            rows[name] for name in ("momentum", "angular_momentum", "orientation")
+        )
+        velocity = momentum * self._of_bodies("inverse_mass", chosen)[..., None]
+        spin = self._spin(self._of_bodies("inverse_inertia", chosen), orientation, turning)
         self._write_parameters(mask, new)
-        mover, bodies = self._state.mover, slice(0, self._bodies)
+        # velocities stay; where nothing bears on them their momenta do, to the last bit
         heavier = (new.mass != before.mass)[..., None]
-        momentum = velocity / self._inverse_mass[mask][..., None]
-        mover["momentum"][mask, bodies] = np.where(
-            heavier, momentum, mover["momentum"][mask, bodies]
-        )
-        turned = self._spin_momentum(mask, mover["orientation"][mask, bodies], spin)
-        mover["angular_momentum"][mask, bodies] = np.where(
-            heavier | (new.size != before.size)[..., None],
-            turned,
-            mover["angular_momentum"][mask, bodies],
-        )
+        other = heavier | (new.size != before.size)[..., None]
+        kept = velocity / self._of_bodies("inverse_mass", chosen)[..., None]
+        rows["momentum"] = np.where(heavier, kept, momentum)
+        kept = spin_momentum(self._of_bodies("inertia", chosen), orientation, spin)
+        rows["angular_momentum"] = np.where(other, kept, turning)
+        self._state.mover[mask, : self._bodies] = rows
         self._forget(mask)
 
     def _check_new(self, new: Parameters, worlds: Array) -> None:
@@ -144,12 +145,6 @@ class Variation(Readings):
         for mine, values in zip(self._parameters, new, strict=True):
             mine[mask] = values
         vary(self._model, self._layout, np.flatnonzero(mask), new)
-
-    def _spin_momentum(self, worlds: Array, orientation: Array, spin: Array) -> Array:
-        """L = R J0 R^T omega [chosen, bodies, 3] of the bodies of some worlds."""
-        inertia = self._of_movers("inertia")[..., : self._bodies, :]
-        inertia = inertia[worlds] if self._features.varied else inertia
-        return spin_momentum(inertia, orientation, spin)
 
 
 def spin_momentum(inertia: Array, orientation: Array, spin: Array) -> Array:

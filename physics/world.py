@@ -118,9 +118,11 @@ class World(Variation):
             mover, bodies = self._state.mover, self._bodies
             velocity = np.array([b.linear_velocity for b in self.scene.bodies]).reshape(-1, 3)
             spin = np.array([b.angular_velocity for b in self.scene.bodies]).reshape(-1, 3)
-            turn = mover["orientation"][worlds, :bodies]
-            mover["momentum"][worlds, :bodies] = velocity / self._inverse_mass[worlds][..., None]
-            mover["angular_momentum"][worlds, :bodies] = self._spin_momentum(worlds, turn, spin)
+            turn = np.array([b.orientation for b in self.scene.bodies]).reshape(-1, 4)
+            chosen = np.flatnonzero(worlds)
+            inverse, inertia = (self._of_bodies(x, chosen) for x in ("inverse_mass", "inertia"))
+            mover["momentum"][worlds, :bodies] = velocity / inverse[..., None]
+            mover["angular_momentum"][worlds, :bodies] = spin_momentum(inertia, turn, spin)
         self._state.world["time"][worlds] = 0.0
         self._forget(worlds)
 
@@ -314,11 +316,13 @@ class World(Variation):
         if "orientation" in new:
             state.mover["orientation"][mask, :bodies] = new["orientation"]
         if "linear_velocity" in new:
-            inverse = self._inverse_mass[mask] if self._features.varied else self._inverse_mass
+            inverse = self._of_bodies("inverse_mass", np.flatnonzero(mask))
             state.mover["momentum"][mask, :bodies] = new["linear_velocity"] / inverse[..., None]
         if spin is not None:
             turn = state.mover["orientation"][mask, :bodies]
-            state.mover["angular_momentum"][mask, :bodies] = self._spin_momentum(mask, turn, spin)
+            state.mover["angular_momentum"][mask, :bodies] = spin_momentum(
+                self._of_bodies("inertia", np.flatnonzero(mask)), turn, spin
+            )
         if "drive_position" in new:
             state.mover["position"][mask, bodies:] = new["drive_position"]
             state.mover["reference"][mask, bodies:] = new["drive_position"]
