@@ -16,9 +16,12 @@ FORCE_SCALE = 0.02
 def items(runner: Runner, world: int) -> list[Item]:
     """Bodies, drives and statics of one world."""
     engine, scene = runner.world, runner.world.scene
+    sizes = np.ones(len(scene.bodies))
+    if engine.features.varied:
+        sizes = engine.parameters.size[world]
     found = [
         Item(
-            body.shape,
+            body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i])),
             engine.position[world, i],
             engine.orientation[world, i],
             BODY_COLORS[i % len(BODY_COLORS)],

@@ -21,6 +21,7 @@ class Task(ABC):
         goal_bounds: likewise of a goal.
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
+        sizes: whether `start` takes worlds whose bodies have sizes of their own.
 
     What an instance needs to know beyond its class, as a number of blocks, are arguments of its
     constructor, which gym.make hands on.
@@ -32,6 +33,7 @@ class Task(ABC):
     goal_bounds: tuple[tuple[str, str, float, float], ...]
     draws: int
     reward: Reward
+    sizes: ClassVar[bool] = False
 
     @abstractmethod
     def scene(self) -> Scene:
