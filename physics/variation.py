@@ -127,9 +127,10 @@ class Variation(Readings):
             Parameters(*(end(values, axis=0, keepdims=True) for values in new))
             for end in (np.min, np.max)
         )
-        if self._checked is not None:
-            safe = zip(low, self._checked[0], self._checked[1], high, strict=True)
-            if all((a <= b).all() and (d <= c).all() for b, a, c, d in safe):
+        if self._checked is not None:  # and what lies between that range and these
+            low = Parameters(*map(np.minimum, low, self._checked[0]))
+            high = Parameters(*map(np.maximum, high, self._checked[1]))
+            if all(map(np.array_equal, (*low, *high), (*self._checked[0], *self._checked[1]))):
                 return
         try:  # all at once; should that fail, it may be for two that never meet
             check_range(self.scene, self.fidelity, low, high)

@@ -383,7 +383,9 @@ class World(Variation):
         if what:
             raise ValueError(f"saved must be of the same worlds; it has another {what}")
         if saved.parameters is not None:
-            self._write_parameters(self._everyone, saved.parameters)
+            pairs = zip(self._parameters, saved.parameters, strict=True)
+            other = np.any([np.any(mine != theirs, axis=1) for mine, theirs in pairs], axis=0)
+            self._write_parameters(other, saved.parameters.pick(other))
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
         self._rows_valid = False

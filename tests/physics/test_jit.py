@@ -29,7 +29,9 @@ print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), world.po
 PUSH = """
 from physics import World
 from physics.reference import scenes
-world = World(scenes.push_like())
+world = World(scenes.push_like(), varied={varied})
+if world.features.varied:
+    world.set_parameters(mass=0.17, friction=0.3, restitution=0.4)
 world.set_state(position=(0.0, 0.0, 0.0199), drive_position=(-0.0349, 0.0, 0.021))
 world.command_drives((0.3, 0.1, 0.0))
 world.advance(0.02)
@@ -123,8 +125,10 @@ def test_only_one_file_names_the_options_of_numba():
             ), path
 
 
-def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path):
-    plain = run(PUSH, tmp_path, NUMBA_DISABLE_JIT="1")
-    compiled = run(PUSH, os.environ.get("NUMBA_CACHE_DIR", tmp_path))
+@pytest.mark.parametrize("varied", [False, True])
+def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path, varied):
+    script = PUSH.format(varied=varied)
+    plain = run(script, tmp_path, NUMBA_DISABLE_JIT="1")
+    compiled = run(script, os.environ.get("NUMBA_CACHE_DIR", tmp_path))
     assert len(plain) == len(compiled) > 20
     np.testing.assert_allclose(plain, compiled, rtol=1e-9, atol=1e-9)

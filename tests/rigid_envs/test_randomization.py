@@ -10,6 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import rigid_envs  # noqa: F401
+from rigid_envs import scene_view
 from rigid_envs.draws import normal, uniform
 from rigid_envs.runner import Runner
 
@@ -80,6 +81,13 @@ def test_a_cube_of_another_size_lies_on_the_ground():
     np.testing.assert_allclose(runner.goals[:, 2], half, rtol=1e-6)
     runner.world.advance(0.5)
     np.testing.assert_allclose(runner.world.position[:, 0, 2], half, atol=5e-4)
+
+
+def test_a_picture_shows_the_size_that_was_drawn():
+    runner = Runner("push", 2, randomize={"size": (1.5, 1.5)})
+    runner.reset(np.ones(2, dtype=bool), np.arange(2))
+    cube = scene_view.items(runner, 1)[0]
+    np.testing.assert_allclose(cube.shape.half_extents, 0.03)
 
 
 def test_observed_parameters_are_those_drawn_and_lie_in_the_space():
