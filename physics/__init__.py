@@ -4,6 +4,7 @@ from physics.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged
 from physics.features import Features
 from physics.fidelity import PRESETS, Fidelity
+from physics.parameters import Parameters
 from physics.readout import Readout
 from physics.scene import Body, Drive, Gripper, Ground, Material, Scene, Static
 from physics.shapes import Box, Capsule, Sphere
@@ -22,6 +23,7 @@ __all__ = [
     "Gripper",
     "Ground",
     "Material",
+    "Parameters",
     "Readout",
     "Scene",
     "SimulationDiverged",

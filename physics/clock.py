@@ -9,7 +9,7 @@ import math
 from functools import cache
 
 from physics.features import Features
-from physics.group import load, store
+from physics.group import load, make_constants, store
 from physics.jit import LANES, SOURCES, entry, kernel, stage
 from physics.pipeline import make_substep
 from physics.readout import make_write_rows
@@ -75,14 +75,15 @@ def make_advance(features: Features):
     bit whatever runs beside it, and however groups are shared out over threads.
     """
     sources = SOURCES
-    forget = make_forget(features)
+    constants, forget = make_constants(features), make_forget(features)
     substep = make_substep(features)
     write_back = make_write_back(features)
 
     @entry
-    def advance(model, state, work, rows, chosen, first, last, h, substeps, collision_substeps):
+    def advance(all_model, state, work, rows, chosen, first, last, h, substeps, collision_substeps):
         _ = sources
         for g in range(first, last):
+            model = constants(all_model, g)
             if load(model, state, work, chosen, g) == 0:
                 continue
             place_statics(model, work)  # a group that diverged leaves nothing for the next

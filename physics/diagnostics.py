@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.features import Features
-from physics.group import Work, load
+from physics.group import Work, load, make_constants
 from physics.jit import LANES, SOURCES, entry
 from physics.landing import point_jacobian
 from physics.model import Model
@@ -66,13 +66,14 @@ class Report(NamedTuple):
 def _make_report(features: Features) -> Any:
     """Entry point that evaluates every candidate of a group of worlds at its present state."""
     sources = SOURCES
-    kinematics = make_kinematics(features)
+    constants, kinematics = make_constants(features), make_kinematics(features)
     impulse = features.impulse
     side = make_points(features) if impulse else make_side(features, True)
 
     @entry
-    def report(model, state, work, chosen, rows):
+    def report(group, state, work, chosen, rows):
         _ = sources
+        model = constants(group, 0)
         place_statics(model, work)
         load(model, state, work, chosen, 0)
         place_tools(model, work)
@@ -105,8 +106,8 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
     everyone = np.ones(len(copied.world), dtype=bool)
-    work = Work.of(model, features)
-    _make_report(features)(model, copied, work, everyone, rows)
+    work = Work.of(model.of_world(0), features)
+    _make_report(features)(model.of_group(group), copied, work, everyone, rows)
     if features.impulse:
         rows["overlap"], rows["weight"] = -work.point["gap"], work.point["weight"]
         rows["point"], rows["normal"] = work.point["arm"], work.point["normal"]
@@ -130,6 +131,7 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
 def report(model: Model, features: Features, state: State, world: int) -> Report:
     """What touches in a world."""
     rows, lane = _rows_of_group(model, features, state, world // LANES), world % LANES
+    model = model.of_world(world)
     side, slot = _touching(model, state, world, rows)
 
     statics, mover = model.static, state.mover[world]
@@ -164,6 +166,7 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
 def contacts(model: Model, features: Features, state: State, world: int) -> Contacts:
     """The touching points of one world."""
     told = report(model, features, state, world)
+    model = model.of_world(world)
     side = model.side[told.side]
     pair = np.stack([side["owner"], side["surface"]], axis=-1)
     first = {
@@ -227,10 +230,11 @@ def samples(model: Model, solid: int) -> tuple[Array, float]:
 def penetration(model: Model, features: Features, state: State) -> Array:
     """Deepest overlap of each world now, [w] m, 0 where nothing touches."""
     deepest = np.zeros(len(state.world))
+    sides = model.of_world(0)
     for group in range(len(state.candidate)):
         rows = _rows_of_group(model, features, state, group)
         for world in range(group * LANES, min((group + 1) * LANES, len(deepest))):
-            slot = _touching(model, state, world, rows)[1]
+            slot = _touching(sides, state, world, rows)[1]
             deepest[world] = rows["overlap"][slot, world % LANES].max(initial=0.0)
     return deepest
 
@@ -246,6 +250,7 @@ def contact_shares(
         Coordinates are each mover's displacement, then its rotation vector, in the world frame.
     """
     told = report(model, features, state, world)
+    model = model.of_world(world)
     movers = len(model.mover)
     shares: dict[int, tuple[Array, Array, Array]] = {}
     for k, point, normal, weight in zip(

@@ -22,6 +22,7 @@ class Features(NamedTuple):
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         drives: there are driven tools.
         gripper: some of them are the fingers of grippers.
+        varied: worlds have masses, materials and sizes of their own.
     """
 
     impulse: bool
@@ -37,3 +38,4 @@ class Features(NamedTuple):
     particles: bool
     drives: bool
     gripper: bool
+    varied: bool

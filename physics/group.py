@@ -6,14 +6,14 @@ loops over the lanes without a branch, which LLVM turns into vector instructions
 the price of one. Lanes never mix, so a world's result doesn't depend on what runs beside it.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from physics.features import Features
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, aligned_zeros, kernel, stage
 from physics.model import Model
-from physics.state import aligned_zeros
 
 Array = np.ndarray
 
@@ -173,6 +173,20 @@ class Work(NamedTuple):
             point=aligned_zeros(slots if features.impulse else 0, POINT),
             near=np.zeros(2 * longest if features.impulse else 0, NEAR),
         )
+
+
+@cache
+def make_constants(features: Features):
+    """Stage that tells the constants of group g: one row a mover and side."""
+    varied = features.varied
+
+    @stage
+    def constants(model, g):
+        if varied:
+            return Model(model.mover[g], model.side[g], model.static, model.sample)
+        return model
+
+    return constants
 
 
 @kernel

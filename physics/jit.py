@@ -20,8 +20,10 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 from numba import njit, typeof
-from numba.core import config
-from numba.extending import register_jitable
+from numba.core import config, types
+from numba.extending import overload, register_jitable
+
+Array = np.ndarray
 
 _PACKAGE = Path(__file__).parent
 
@@ -47,6 +49,7 @@ llvm.set_option("", f"-vectorizer-min-trip-count={LANES}")
 # atomic instructions, wherever control flow is too rich for it to see that this is idle. The
 # price is that kernels can't allocate; scratch arrays come from Python.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
+_INLINE: Any = {"forceinline": True, **_OPTIONS}
 
 
 def kernel(function: Any) -> Any:
@@ -56,7 +59,22 @@ def kernel(function: Any) -> Any:
 
 def stage(function: Any) -> Any:
     """A stage, or a formula in its loop over lanes: merged into its caller."""
-    return register_jitable(forceinline=True, **_OPTIONS)(function)
+    return register_jitable(**_INLINE)(function)
+
+
+def at(value: Any, i: int) -> Any:
+    """A constant in lane i: the number itself, or the entry of an array with one for each lane.
+
+    Which of them is settled by the type: for a number, nothing of this remains in the code.
+    """
+    return value[i] if isinstance(value, np.ndarray) else value
+
+
+@overload(at, jit_options=_INLINE, strict=False)
+def _at(value: Any, i: Any) -> Any:
+    if isinstance(value, types.Array):
+        return lambda value, i: value[i]
+    return lambda value, i: value
 
 
 def entry(function: Any) -> Any:
@@ -79,6 +97,15 @@ def entry(function: Any) -> Any:
 
     call.compiled = compiled  # type: ignore[attr-defined]
     return call
+
+
+def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
+    """Zeros that begin at a cache line, as vectors of LANES doubles should."""
+    line = 64
+    size = int(np.prod(shape)) * dtype.itemsize
+    room = np.zeros(size + line, dtype=np.uint8)
+    first = -room.ctypes.data % line
+    return room[first : first + size].view(dtype).reshape(shape)
 
 
 def _on_records(function: Any) -> Any:

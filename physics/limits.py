@@ -3,11 +3,16 @@
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from physics import stability
 from physics.features import Features
 from physics.fidelity import Fidelity
+from physics.layout import spacing
 from physics.model import Model, build
-from physics.scene import Scene
+from physics.parameters import Parameters, with_parameters
+from physics.scene import Ground, Scene
+from physics.shapes import Sphere
 
 
 def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
@@ -20,6 +25,69 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
     _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
     _check_stiffness(scene, fidelity, model, features)
+
+
+def check_range(scene: Scene, fidelity: Fidelity, low: Parameters, high: Parameters) -> None:
+    """As `check_step`, for all parameters between two ends [1, bodies].
+
+    Stability is looked for at the ends: all bodies at one, and each in turn at the other. Without a
+    stiffness that materials name it follows from the masses, and only the smallest can sink.
+    """
+    _check_spacing(scene, fidelity, low, high, "")
+    if not _given_stiffness(scene):
+        smallest = Parameters.of(scene)._replace(size=low.size)
+        _check_built(scene, fidelity, smallest, "size")
+        return
+    bodies = len(scene.bodies)
+    for restitution in {low.restitution.tobytes(): low, high.restitution.tobytes(): high}.values():
+        for most, least in ((low, high), (high, low)):
+            for i in range(-1, bodies):  # body i at the other end
+                at = np.arange(bodies) == i
+                mass, size = (
+                    np.where(at, getattr(least, name), getattr(most, name))
+                    for name in ("mass", "size")
+                )
+                corner = Parameters(mass, high.friction, restitution.restitution, size)
+                _check_built(scene, fidelity, corner, "mass, size and restitution")
+
+
+def check_world(scene: Scene, fidelity: Fidelity, p: Parameters, world: int) -> None:
+    """As `check_step`, for the parameters [1, bodies] of one world."""
+    _check_spacing(scene, fidelity, p, p, f" in world {world}")
+    _check_built(scene, fidelity, p, f"the parameters of world {world},")
+
+
+def _check_built(scene: Scene, fidelity: Fidelity, p: Parameters, what: str) -> None:
+    built = with_parameters(scene, p)
+    try:
+        check_step(built, fidelity, *build(built, fidelity))
+    except ValueError as error:
+        values = ", ".join(
+            f"body {i}: mass {p.mass[0, i]:g} kg, size {p.size[0, i]:g}, "
+            f"restitution {p.restitution[0, i]:g}"
+            for i in range(len(scene.bodies))
+        )
+        raise ValueError(f"{what} can't be had ({values}): {error}") from None
+
+
+def _check_spacing(
+    scene: Scene, fidelity: Fidelity, low: Parameters, high: Parameters, where: str
+) -> None:
+    """Samples stay what they are in the scene: a body that shrinks could fall between them."""
+    largest = [*high.size[0], *(1.0 for _ in (*scene.tools, *scene.statics))]
+    solids = [*scene.bodies, *scene.tools, *scene.statics]
+    for i, solid in enumerate(solids):
+        if isinstance(solid, Ground) or isinstance(solid.shape, Sphere):
+            continue  # a plane has no samples, and the one of a sphere is exact
+        apart = float(largest[i]) * spacing(solid.shape, scene, fidelity)
+        for j, body in enumerate(scene.bodies):
+            width = float(low.size[0, j]) * body.shape.width
+            if i != j and apart > width * (1.0 + 1e-9):
+                raise ValueError(
+                    f"size {low.size[0, j]:g} makes body {j}{where} {width:g} m wide, and the "
+                    f"samples of solid {i} can lie {apart:g} m apart: it would fall between them; "
+                    "keep sizes closer together, or choose a smaller Fidelity.spacing"
+                )
 
 
 def _below(x: float) -> str:

@@ -66,19 +66,19 @@ def combine(
     return MassProperties(mass, center, inertia)
 
 
-def sphere_inertia(mass: float, radius: float) -> Array:
-    """Solid sphere, [3] principal moments."""
-    return np.full(3, 0.4 * mass * radius**2)
+def sphere_inertia(mass: float | Array, radius: float) -> Array:
+    """Solid sphere of mass [...], [..., 3] principal moments."""
+    return np.multiply.outer(0.4 * mass * radius**2, np.ones(3))
 
 
-def box_inertia(mass: float, half_extents: Array) -> Array:
-    """Solid box, [3] principal moments: m/3 (b^2 + c^2) with half extents."""
+def box_inertia(mass: float | Array, half_extents: Array) -> Array:
+    """Solid box of mass [...], [..., 3] principal moments: m/3 (b^2 + c^2) with half extents."""
     a, b, c = np.square(half_extents)
-    return mass / 3.0 * np.array([b + c, a + c, a + b])
+    return np.multiply.outer(mass / 3.0, np.array([b + c, a + c, a + b]))
 
 
-def capsule_inertia(mass: float, radius: float, half_length: float) -> Array:
-    """Solid capsule about its z axis, [3] principal moments.
+def capsule_inertia(mass: float | Array, radius: float, half_length: float) -> Array:
+    """Solid capsule of mass [...] about its z axis, [..., 3] principal moments.
 
     A cylinder of length 2 l and two half spheres, whose centres of mass lie 3/8 r beyond its ends.
     """
@@ -91,4 +91,4 @@ def capsule_inertia(mass: float, radius: float, half_length: float) -> Array:
     transverse = cylinder_mass * (r**2 / 4.0 + half**2 / 3.0) + cap_mass * (
         0.4 * r**2 + half**2 + 0.75 * half * r
     )
-    return np.array([transverse, transverse, axial])
+    return np.stack([transverse, transverse, axial], axis=-1)

@@ -1,33 +1,27 @@
 """Model: the constants of a scene at a fidelity, as arrays that kernels read.
 
-Movers are the bodies, then the drives. Solids are the movers, then the statics. A pair of solids
-meets through one or two sides: the samples of an owner against the surface of another.
+Movers are the bodies, then the drives. Solids and sides: see `layout`.
+
+Worlds that are all alike share one row a mover and side. Where they are varied, each group of
+worlds has rows of its own, in which the fields that differ hold a value for each lane; kernels read
+both by `at`, and nothing of it remains in the code for worlds that are alike.
 """
 
-import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from physics.constants import of_movers, of_sides
 from physics.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.fidelity import Fidelity
-from physics.landing import fastest
-from physics.scene import NO_TURN, Body, Drive, Ground, Material, Scene, Static
-from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Box, Samples, Sphere, Surface
-from physics.stages.friction import tangential_coefficients
-from physics.stages.normal_force import damping_coefficient, rest_speed
+from physics.jit import LANES, aligned_zeros
+from physics.layout import Layout
+from physics.parameters import Parameters
+from physics.scene import NO_TURN, Body, Ground, Scene
+from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Box, Samples, Sphere
 
 Array = np.ndarray
-# How much faster a cube rocks on its face than it bobs, in stiffness by mass. A plate rocks twice
-# as fast again, and would outrun the step: its contacts are that much softer
-_CUBE = 9.0 / 8.0
-# of the impulse law: the damping ratio of a soft contact, and the steps of free fall whose speed
-# counts as rest
-SOFT_DAMPING, REST_STEPS = 1.0, 4.0
-Solid = Body | Drive | Static | Ground
-
-
 # one row a mover: bodies, then drives. A drive has no inertia: it never turns
 MOVER = np.dtype(
     [
@@ -65,12 +59,17 @@ SIDE = np.dtype(
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
         ("owner_reach", "f8"),  # m
         ("surface_reach", "f8"),  # m
+        ("owner_size", "f8"),  # factor of the samples' positions
+        ("surface_size", "f8"),  # likewise of the partners'
+        ("share", "f8"),  # of the pair's load, factor of the samples' weights
         ("skin", "f8"),  # m
         ("stiffness", "f8"),  # N/m of a whole face
         ("damping", "f8"),  # the law's coefficient
         ("restitution", "f8"),
         ("rest_speed", "f8"),  # m/s, floor of the impact speed
         ("pair_mass", "f8"),  # kg, reduced mass
+        ("owner_inverse_mass", "f8"),  # 1/kg
+        ("surface_inverse_mass", "f8"),  # 1/kg; 0 for statics
         ("shear_stiffness", "f8"),  # N/m
         ("shear_damping", "f8"),  # N s/m
         ("friction", "f8"),
@@ -82,15 +81,41 @@ SIDE = np.dtype(
     align=True,
 )
 
+# what differs where worlds are varied
+MOVER_VARIES = ("reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
+SIDE_VARIES = (
+    "core",
+    "owner_radius",
+    "radius",
+    "owner_reach",
+    "surface_reach",
+    "owner_size",
+    "surface_size",
+    "share",
+    "skin",
+    "stiffness",
+    "damping",
+    "restitution",
+    "rest_speed",
+    "pair_mass",
+    "owner_inverse_mass",
+    "surface_inverse_mass",
+    "shear_stiffness",
+    "shear_damping",
+    "friction",
+    "twist_stiffness",
+    "twist_damping",
+)
+
 
 class Model(NamedTuple):
     """The constants of a scene.
 
     Attributes:
-        mover: [m] of MOVER.
-        side: [k] of SIDE.
+        mover: [m] of MOVER; of varied worlds [groups, m], with a value a lane of MOVER_VARIES.
+        side: [k] of SIDE; of varied worlds [groups, k], with a value a lane of SIDE_VARIES.
         static: [s, 7] position m and quaternion x y z w of the statics.
-        sample: [p, 4] x y z in m in the owner's frame, and weight.
+        sample: [p, 4] x y z in m in the owner's frame at size 1, and weight.
     """
 
     mover: Array
@@ -103,150 +128,92 @@ class Model(NamedTuple):
         """Bytes of all arrays: once for all worlds."""
         return sum(array.nbytes for array in self)
 
+    def of_world(self, world: int) -> "Model":
+        """The model of one world, by itself."""
+        if self.mover.ndim == 1:
+            return self
+        group, lane = divmod(world, LANES)
+        tables = []
+        for table, dtype, fields in (
+            (self.mover, MOVER, MOVER_VARIES),
+            (self.side, SIDE, SIDE_VARIES),
+        ):
+            rows = np.zeros(table.shape[1], dtype=dtype)
+            for name in dtype.names or ():
+                values = table[name][group]
+                rows[name] = values[..., lane] if name in fields else values
+            tables.append(rows)
+        return self._replace(mover=tables[0], side=tables[1])
 
-class Side(NamedTuple):
-    """The samples of solid `owner` against the surface of solid `other`."""
-
-    owner: int
-    other: int
-    samples: Samples
-    surface: Surface
-    partners: Samples | None
-
-
-def _pair_material(a: Material, b: Material) -> tuple[float, float, float | None]:
-    """Friction, restitution and stiffness of two surfaces in contact."""
-    given = [m.stiffness for m in (a, b) if m.stiffness is not None]
-    stiffness = 1.0 / sum(1.0 / k for k in given) if given else None
-    return math.sqrt(a.friction * b.friction), max(a.restitution, b.restitution), stiffness
-
-
-def _resistance(a: Material, b: Material) -> tuple[float, float]:
-    """Lengths in m of the resistance against rolling and spinning."""
-    rolling = max(a.rolling_resistance, b.rolling_resistance)
-    return rolling, max(a.spinning_resistance, b.spinning_resistance)
-
-
-def _least_inertia(solid: Solid) -> float:
-    """Smallest principal moment in kg m^2; infinite for what doesn't turn."""
-    if not isinstance(solid, Body):
-        return math.inf
-    assert solid.mass is not None
-    return float(solid.shape.inertia(solid.mass).min())
+    def of_group(self, group: int) -> "Model":
+        """The model of one group of worlds, as the kernels take it."""
+        if self.mover.ndim == 1:
+            return self
+        alone = slice(group, group + 1)
+        return self._replace(mover=self.mover[alone], side=self.side[alone])
 
 
-def _spacing(solid: Solid, scene: Scene, fidelity: Fidelity) -> float:
-    """Sample spacing in m, for the smallest body: it would fall between coarser samples."""
-    if isinstance(solid, Ground):
-        return math.inf
-    widths = [body.shape.width for body in scene.bodies]
-    return fidelity.spacing * min([solid.shape.width, *widths])
+def _spread(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
+    """The rows of a group of worlds: these fields with an entry for each lane."""
+    assert dtype.names is not None
+    assert dtype.fields is not None
+    entries = []
+    for name in dtype.names:
+        field = dtype.fields[name][0]
+        shape = (*field.shape, LANES) if name in fields else field.shape
+        entries.append((name, field.base, shape))
+    return np.dtype(entries, align=True)
 
 
-def _sides(scene: Scene, fidelity: Fidelity) -> Iterator[Side]:
-    """All sides through which the scene's solids can meet, in a fixed order."""
-    solids: list[Solid] = [*scene.bodies, *scene.tools, *scene.statics]
-    movers = len(scene.bodies) + len(scene.tools)
+def build(scene: Scene, fidelity: Fidelity, varied: bool = False) -> tuple[Model, Features]:
+    """The arrays of a scene at a fidelity, and the features that it needs.
 
-    def rounding(solid: Body | Drive | Static) -> float:
-        return fidelity.rounding * solid.shape.width / 2.0
-
-    def samples(solid: Body | Drive | Static) -> Samples:
-        spacing = _spacing(solid, scene, fidelity)
-        if fidelity.geometry == "particle" and isinstance(solid, Body):
-            return solid.shape.particles(spacing)
-        return solid.shape.samples(spacing, rounding(solid))
-
-    # a gripper's servo keeps its fingers apart
-    first_tool = len(scene.bodies)
-    twins = {(first_tool + first, first_tool + first + 1) for first, _ in scene.grippers}
-    for i, a in enumerate(solids[:movers]):
-        assert not isinstance(a, Static | Ground)
-        for j in range(i + 1, len(solids)):
-            b = solids[j]
-            if (i, j) in twins:
-                continue
-            if isinstance(b, Ground):
-                plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
-                yield Side(i, j, samples(a), plane, None)
-                continue
-            bodies = isinstance(a, Body) and isinstance(b, Body)
-            if fidelity.geometry == "particle" and bodies:
-                pa, pb = samples(a), samples(b)
-                yield Side(i, j, pa, Surface(PARTICLES, (0.0, 0.0, 0.0), pb.radius), pb)
-                continue
-            forward = Side(i, j, samples(a), b.shape.surface(rounding(b)), None)
-            backward = Side(j, i, samples(b), a.shape.surface(rounding(a)), None)
-            if fidelity.geometry == "particle" and isinstance(a, Body):
-                yield forward  # particles leave no gap for a tool to slip through
-            elif isinstance(a.shape, Sphere):
-                yield forward  # the centre of a sphere is exact
-            elif isinstance(b.shape, Sphere):
-                yield backward
-            else:
-                # of a wide face few samples lie where a narrow one touches it, so the narrow one's
-                # bear the more: half and half of equal ones
-                area, other = a.shape.width**2, b.shape.width**2
-                for side, share in ((forward, other), (backward, area)):
-                    weights = share / (area + other) * side.samples.weights
-                    yield side._replace(samples=side.samples._replace(weights=weights))
+    With `varied` they are those for worlds with parameters of their own, see `spread`.
+    """
+    layout = Layout.of(scene, fidelity)
+    own = Parameters.of(scene)
+    movers, (sides, samples) = _mover_rows(scene), _side_rows(layout)
+    for rows, columns in ((movers, of_movers(layout, own)), (sides, of_sides(layout, own))):
+        for name, values in columns.items():
+            rows[name] = values[0]
+    poses = [
+        (0.0, 0.0, 0.0, *NO_TURN) if isinstance(s, Ground) else (*s.position, *s.orientation)
+        for s in scene.statics
+    ]
+    static = np.array(poses, dtype=float).reshape(-1, 7)
+    model = Model(movers, sides, static, samples)
+    return model, _features(scene, fidelity, model, varied)
 
 
-def _capacity(side: Side) -> int:
-    """Candidates that a side has room for: all its samples, or eight partners to each particle."""
-    n = len(side.samples.weights)
-    if side.partners is None:
-        return n
-    m = len(side.partners.weights)
-    return min(n * m, 8 * max(n, m))
+def spread(model: Model, count: int) -> Model:
+    """The same model with rows of its own for each group of `count` worlds, all still alike."""
+    tables = []
+    for rows, fields in ((model.mover, MOVER_VARIES), (model.side, SIDE_VARIES)):
+        table = aligned_zeros((-(-count // LANES), len(rows)), _spread(rows.dtype, fields))
+        for name in rows.dtype.names or ():
+            table[name] = rows[name][..., None] if name in fields else rows[name]
+        tables.append(table)
+    return model._replace(mover=tables[0], side=tables[1])
 
 
-def _fastest(solid: Solid) -> tuple[float, float]:
-    """See `landing.fastest`, at one spacing for all fidelities; 1 for what doesn't turn."""
-    if not isinstance(solid, Body):
-        return 1.0, 1.0
-    return fastest(solid.shape, 0.5 * solid.shape.width)
+def vary(model: Model, layout: Layout, worlds: Array, p: Parameters) -> None:
+    """Writes what follows from the parameters [n, bodies] of the worlds [n] into a spread model."""
+    group, lane = np.divmod(worlds, LANES)
+    tables = (model.mover, of_movers(layout, p)), (model.side, of_sides(layout, p))
+    for table, columns in tables:
+        for name, values in columns.items():
+            table[name][group, ..., lane] = values
 
 
-def _shear_mass(solid: Solid, across: float) -> float:
-    """Mass in kg that a tangential force at the surface feels, turning included."""
-    if isinstance(solid, Static | Ground):
-        return math.inf
-    assert solid.mass is not None
-    return solid.mass / across
-
-
-def _leverage(solid: Solid) -> float:
-    """See `tangential_coefficients`: of a box that lies on its widest face; balls don't rock."""
-    if not isinstance(solid, Body) or not isinstance(solid.shape, Box):
-        return 0.0
-    height, *sides = sorted(solid.shape.half_extents)
-    # three quarters of a face's weight lie on the two edges across the motion, one on its middle
-    return sum(height**2 / (0.75 * side**2) for side in sides) / 2.0
-
-
-def _mover_row(solid: Solid, gravity: Array) -> tuple[object, ...]:
-    """A row of MOVER."""
-    assert isinstance(solid, Body | Drive)
-    assert solid.mass is not None
-    reach = solid.shape.reach
-    if isinstance(solid, Body):
-        inertia = solid.shape.inertia(solid.mass)
-        weight = solid.mass * gravity + 0.0  # without a negative zero, which sums would lose
-        servo = 0.0, 0.0, 0.0, -1, 0.0
-        return 1, reach, 1.0 / solid.mass, inertia, 1.0 / inertia, weight, *servo
-    stiffness = solid.mass * solid.frequency**2
-    damping = 2.0 * solid.damping_ratio * solid.mass * solid.frequency
-    endless, zero = np.full(3, np.inf), np.zeros(3)
-    limit = solid.force_limit
-    servo = stiffness, damping, limit, -1, 0.0
-    return 0, reach, 1.0 / solid.mass, endless, zero, zero, *servo
-
-
-def _mover_rows(scene: Scene, gravity: Array) -> Array:
-    """All rows of MOVER."""
-    movers: list[Solid] = [*scene.bodies, *scene.tools]
-    rows = np.array([_mover_row(m, gravity) for m in movers], dtype=MOVER)
+def _mover_rows(scene: Scene) -> Array:
+    """All rows of MOVER: what doesn't follow from parameters."""
+    rows = np.zeros(len(scene.bodies) + len(scene.tools), dtype=MOVER)
+    rows["turns"][: len(scene.bodies)] = 1
+    rows["twin"] = -1
+    for row, drive in zip(rows[len(scene.bodies) :], scene.tools, strict=True):
+        row["servo_stiffness"] = drive.mass * drive.frequency**2
+        row["servo_damping"] = 2.0 * drive.damping_ratio * drive.mass * drive.frequency
+        row["force_limit"] = drive.force_limit
     for index, gripper in scene.grippers:
         first = len(scene.bodies) + index
         rows["twin"][first : first + 2] = first + 1, first
@@ -254,16 +221,9 @@ def _mover_rows(scene: Scene, gravity: Array) -> Array:
     return rows
 
 
-def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
-    """The arrays and the features of a scene at a fidelity."""
-    solids: list[Solid] = [*scene.bodies, *scene.tools, *scene.statics]
-    gravity = np.array(scene.gravity)
-    g = float(np.sqrt(np.sum(gravity**2)))
-    omega = fidelity.contact_resolution / fidelity.substep
-
-    sides = list(_sides(scene, fidelity))
-    modes = [_fastest(solid) for solid in solids]
-    side = np.zeros(len(sides), dtype=SIDE)
+def _side_rows(layout: Layout) -> tuple[Array, Array]:
+    """All rows of SIDE: what doesn't follow from parameters; and the samples."""
+    rows = np.zeros(len(layout.sides), dtype=SIDE)
     samples: list[Array] = [np.zeros((0, 4))]
     slots = 0
 
@@ -272,69 +232,34 @@ def build(scene: Scene, fidelity: Fidelity) -> tuple[Model, Features]:
         samples.append(np.column_stack([some.positions, some.weights]))
         return first, len(some.weights)
 
-    ways = {(pair.owner, pair.other): k for k, pair in enumerate(sides)}
-    for row, pair in zip(side, sides, strict=True):
-        a, b = solids[pair.owner], solids[pair.other]
-        friction, restitution, stiffness = _pair_material(a.material, b.material)
-        movers = [x for x in (a, b) if isinstance(x, Body | Drive)]
-        pair_mass = 1.0 / sum(1.0 / x.mass for x in movers if x.mass)
-        (along_a, across_a), (along_b, across_b) = modes[pair.owner], modes[pair.other]
-        if stiffness is None:
-            stiffness = pair_mass * omega**2 * min(1.0, _CUBE / max(along_a, along_b))
-        shear_mass = 1.0 / (1.0 / _shear_mass(a, across_a) + 1.0 / _shear_mass(b, across_b))
-        row["shear_stiffness"], row["shear_damping"] = tangential_coefficients(
-            stiffness, pair_mass, shear_mass, _leverage(a) + _leverage(b), fidelity.substep
-        )
-        turning = 1.0 / _least_inertia(a) + 1.0 / _least_inertia(b)
-        row["twist_stiffness"] = 1.0  # a tool that meets the ground turns no more than that
-        if turning > 0.0:
-            row["rolling"], row["spinning"] = _resistance(a.material, b.material)
-            row["twist_stiffness"], row["twist_damping"] = tangential_coefficients(
-                omega**2 / turning, 1.0 / turning, 1.0 / turning, 0.0, fidelity.substep
-            )
-        damping = damping_coefficient(restitution, fidelity.damping)
-        row["owner"], row["surface"], row["kind"] = pair.owner, pair.other, pair.surface.kind
-        row["mirror"] = ways.get((pair.other, pair.owner), -1)
-        row["first_sample"], row["sample_count"] = add(pair.samples)
-        if pair.partners is not None:
-            row["first_partner"], row["partner_count"] = add(pair.partners)
-        row["first_slot"], row["slot_count"] = slots, _capacity(pair)
-        slots += int(row["slot_count"])
-        particles = fidelity.geometry == "particle" and isinstance(a, Body)
+    ways = {(side.owner, side.other): k for k, side in enumerate(layout.sides)}
+    for row, side in zip(rows, layout.sides, strict=True):
+        a, b = layout.solids[side.owner], layout.solids[side.other]
+        row["owner"], row["surface"], row["kind"] = side.owner, side.other, side.surface.kind
+        row["mirror"] = ways.get((side.other, side.owner), -1)
+        row["first_sample"], row["sample_count"] = add(side.samples)
+        if side.partners is not None:
+            row["first_partner"], row["partner_count"] = add(side.partners)
+        row["first_slot"], row["slot_count"] = slots, side.capacity
+        slots += side.capacity
+        particles = layout.fidelity.geometry == "particle" and isinstance(a, Body)
         row["sharp"] = not isinstance(a, Ground) and isinstance(a.shape, Box) and not particles
-        row["core"] = pair.surface.parameters
-        row["owner_radius"] = pair.samples.radius
-        row["radius"] = pair.samples.radius + pair.surface.radius
-        row["owner_reach"], row["surface_reach"] = (
-            0.0 if isinstance(x, Ground) else x.shape.reach for x in (a, b)
-        )
-        row["skin"] = fidelity.skin * min(x.shape.width for x in movers)
-        row["stiffness"], row["pair_mass"], row["friction"] = stiffness, pair_mass, friction
-        row["damping"] = damping
-        row["rest_speed"] = rest_speed(damping, g, math.sqrt(stiffness / pair_mass))
-        row["restitution"] = restitution
-        if fidelity.law == "impulse":
-            row["damping"] = 2.0 * SOFT_DAMPING * math.sqrt(stiffness * pair_mass)
-            row["rest_speed"] = REST_STEPS * g * fidelity.substep
-
-    poses = [
-        (0.0, 0.0, 0.0, *NO_TURN) if isinstance(s, Ground) else (*s.position, *s.orientation)
-        for s in scene.statics
-    ]
-    model = Model(
-        mover=_mover_rows(scene, gravity),
-        side=side,
-        static=np.array(poses, dtype=float).reshape(-1, 7),
-        sample=np.concatenate(samples),
-    )
-    return model, _features(scene, fidelity, model)
+        if isinstance(a, Body) or isinstance(b, Body):  # nothing else turns
+            for name in ("rolling", "spinning"):
+                field = f"{name}_resistance"
+                row[name] = max(getattr(a.material, field), getattr(b.material, field))
+    return rows, np.concatenate(samples)
 
 
-def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
+def _features(scene: Scene, fidelity: Fidelity, model: Model, varied: bool) -> Features:
     """What of the engine this scene needs."""
     impulse = fidelity.law == "impulse" and len(model.side) > 0
     kinds = set(model.side["kind"].tolist())
-    friction = bool(np.any(model.side["friction"] > 0.0))
+    # a body without friction may be given some
+    rough = [varied and i < len(scene.bodies) for i in range(len(model.mover) + len(model.static))]
+    solids = (*scene.bodies, *scene.tools, *scene.statics)
+    rough = [r or s.material.friction > 0.0 for r, s in zip(rough, solids, strict=True)]
+    friction = any(rough[side["owner"]] and rough[side["surface"]] for side in model.side)
     # a ball without friction is never turned, and one that doesn't spin needs no orientation
     inert = all(isinstance(b.shape, Sphere) and not any(b.angular_velocity) for b in scene.bodies)
     moments = model.mover["inertia"][: len(scene.bodies)]
@@ -362,4 +287,5 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model) -> Features:
         particles=PARTICLES in kinds,
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
+        varied=varied,
     )

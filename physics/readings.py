@@ -8,6 +8,7 @@ from physics import diagnostics, stability
 from physics.diagnostics import Contacts
 from physics.features import ISOTROPIC, Features
 from physics.fidelity import Fidelity
+from physics.jit import LANES
 from physics.model import Model
 from physics.readout import Readout
 from physics.rotation import rotate, rotate_back
@@ -26,6 +27,7 @@ class Readings:
     count: int
     _bodies: int
     _model: Model
+    _base: Model
     _features: Features
     _state: State
     _rows: Array
@@ -39,8 +41,19 @@ class Readings:
 
     @property
     def _inverse_mass(self) -> Array:
-        """Inverse masses [bodies]."""
-        return self._model.mover["inverse_mass"][: self._bodies]
+        """Inverse masses of the bodies, [bodies] or of each world [count, bodies]."""
+        return self._of_bodies("inverse_mass", np.arange(self.count))
+
+    def _of_bodies(self, name: str, worlds: Array) -> Array:
+        """A field of the model's bodies: [bodies, ...], or [n, bodies, ...] of varied worlds [n].
+
+        Both go with an array [n, bodies, ...].
+        """
+        rows = self._model.mover[name]
+        if self._model.mover.ndim == 1:
+            return rows[: self._bodies]
+        group, lane = np.divmod(worlds, LANES)
+        return rows[group, ..., lane][:, : self._bodies]
 
     def _read(self, values: Array) -> Array:
         view = values[:]
@@ -71,7 +84,7 @@ class Readings:
     def linear_velocity(self) -> Array:
         """[count, bodies, 3] m/s, world frame."""
         return self._read(
-            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[:, None]
+            self._state.mover["momentum"][:, : self._bodies] * self._inverse_mass[..., None]
         )
 
     @property
@@ -79,10 +92,15 @@ class Readings:
         """[count, bodies, 3] rad/s, world frame."""
         momentum = self._state.mover["angular_momentum"][:, : self._bodies]
         turn = self._state.mover["orientation"][:, : self._bodies]
-        inverse = self._model.mover["inverse_inertia"][: self._bodies]
+        inverse = self._of_bodies("inverse_inertia", np.arange(self.count))
+        return self._read(self._spin(inverse, turn, momentum))
+
+    def _spin(self, inverse_inertia: Array, orientation: Array, momentum: Array) -> Array:
+        """Angular velocity [..., 3] of an angular momentum."""
         if self._features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
-            return self._read(inverse * momentum)
-        return self._read(rotate(turn, inverse * rotate_back(turn, momentum)))
+            return np.asarray(inverse_inertia * momentum)
+        turned = inverse_inertia * rotate_back(orientation, momentum)
+        return np.asarray(rotate(orientation, turned))
 
     @property
     def drive_position(self) -> Array:
@@ -92,7 +110,7 @@ class Readings:
     @property
     def drive_velocity(self) -> Array:
         """[count, tools, 3] m/s, world frame."""
-        inverse = self._model.mover["inverse_mass"][self._bodies :]
+        inverse = self._base.mover["inverse_mass"][self._bodies :]
         return self._read(self._state.mover["momentum"][:, self._bodies :] * inverse[:, None])
 
     @property
@@ -110,15 +128,18 @@ class Readings:
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""
         momentum = self._state.mover["momentum"][:, : self._bodies]
-        translation = np.einsum("wbi,wbi,b->w", momentum, momentum, self._inverse_mass)
+        inverse = self._inverse_mass
+        axes = "wbi,wbi,b->w" if inverse.ndim == 1 else "wbi,wbi,wb->w"
+        translation = np.einsum(axes, momentum, momentum, inverse)
         angular = self._state.mover["angular_momentum"][:, : self._bodies]
         rotation = np.einsum("wbi,wbi->w", angular, self.angular_velocity)
         return 0.5 * (translation + rotation)
 
     def potential_energy(self) -> Array:
         """[count] J of the bodies in the field of gravity, zero at the origin."""
-        weight = self._model.mover["weight"][: self._bodies]
-        return -np.einsum("wbi,bi->w", self._state.mover["position"][:, : self._bodies], weight)
+        weight = self._of_bodies("weight", np.arange(self.count))
+        axes = "wbi,bi->w" if weight.ndim == 2 else "wbi,wbi->w"
+        return -np.einsum(axes, self._state.mover["position"][:, : self._bodies], weight)
 
     def linear_momentum(self) -> Array:
         """[count, 3] kg m/s of the bodies."""
@@ -152,7 +173,7 @@ class Readings:
         Args:
             solid: its index, as in `first_touch`.
         """
-        return diagnostics.samples(self._model, self._solid("solid", solid))
+        return diagnostics.samples(self._base, self._solid("solid", solid))
 
     def first_touch(self, first: int, second: int) -> Array:
         """[count] s, when two solids first touched since their state was set; NaN before.
@@ -190,7 +211,7 @@ class Readings:
     def _solid(self, name: str, value: int) -> int:
         """The index of a solid."""
         index = integer(name, value, low=0)
-        last = len(self._model.mover) + len(self._model.static) - 1
+        last = len(self._base.mover) + len(self._base.static) - 1
         if index > last:
             raise ValueError(
                 f"{name} must be the index of a solid, 0 to {last} (bodies, then tools, then "
@@ -203,7 +224,7 @@ class Readings:
         if (first, second) in self._sides_between:
             return first, second
         ends = self._solid("first", first), self._solid("second", second)
-        sides = np.flatnonzero(diagnostics.between(self._model, *ends))
+        sides = np.flatnonzero(diagnostics.between(self._base, *ends))
         if not len(sides):
             raise ValueError(
                 f"first and second must be solids that can meet, got {ends[0]} and {ends[1]}: "
@@ -221,8 +242,9 @@ class Readings:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of state a world, beyond the shared model."""
-        return self._state.nbytes // self.count
+        """Bytes of state a world, beyond the shared model; of varied worlds with their own."""
+        own = self._model.nbytes if self._features.varied else 0
+        return (self._state.nbytes + own) // self.count
 
     def _world_index(self, world: int) -> int:
         index = integer("world", world, low=0)

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.features import GENERAL, NO_ROTATION, Features
-from physics.jit import SOURCES, entry, kernel
+from physics.group import make_constants
+from physics.jit import LANES, SOURCES, at, entry, kernel
 from physics.stages.kinematics import spin_of
 
 Array = np.ndarray
@@ -52,6 +53,8 @@ def make_write_rows(features: Features):
 
     @kernel
     def write_rows(model, state, w, rows):
+        """`model`: of the world's group."""
+        lane = w % LANES
         for i in range(rows.shape[1]):
             m, constants = state.mover[w, i], model.mover[i]
             rows[w, i, 0] = m.position[0]
@@ -65,18 +68,20 @@ def make_write_rows(features: Features):
             rows[w, i, 4] = sign * y
             rows[w, i, 5] = sign * z
             rows[w, i, 6] = sign * s
-            rows[w, i, 7] = constants.inverse_mass * m.momentum[0]
-            rows[w, i, 8] = constants.inverse_mass * m.momentum[1]
-            rows[w, i, 9] = constants.inverse_mass * m.momentum[2]
+            inverse_mass = at(constants.inverse_mass, lane)
+            rows[w, i, 7] = inverse_mass * m.momentum[0]
+            rows[w, i, 8] = inverse_mass * m.momentum[1]
+            rows[w, i, 9] = inverse_mass * m.momentum[2]
             ox = 0.0
             oy = 0.0
             oz = 0.0
             if rotation != NO_ROTATION and constants.turns:
                 L, j = m.angular_momentum, constants.inverse_inertia
+                jx, jy, jz = at(j[0], lane), at(j[1], lane), at(j[2], lane)
                 if rotation == GENERAL:
-                    ox, oy, oz = spin_of(x, y, z, s, j[0], j[1], j[2], L[0], L[1], L[2])
+                    ox, oy, oz = spin_of(x, y, z, s, jx, jy, jz, L[0], L[1], L[2])
                 else:
-                    ox, oy, oz = j[0] * L[0], j[0] * L[1], j[0] * L[2]
+                    ox, oy, oz = jx * L[0], jx * L[1], jx * L[2]
             rows[w, i, 10] = ox
             rows[w, i, 11] = oy
             rows[w, i, 12] = oz
@@ -88,12 +93,12 @@ def make_write_rows(features: Features):
 def make_readout(features: Features) -> Any:
     """Entry point that writes the rows of all worlds."""
     sources = SOURCES
-    write_rows = make_write_rows(features)
+    constants, write_rows = make_constants(features), make_write_rows(features)
 
     @entry
     def readout(model, state, rows):
         _ = sources
         for w in range(rows.shape[0]):
-            write_rows(model, state, w, rows)
+            write_rows(constants(model, w // LANES), state, w, rows)
 
     return readout

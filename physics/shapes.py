@@ -60,8 +60,11 @@ class Shape(Protocol):
     def reach(self) -> float:
         """Largest distance of a surface point from the centre, in m."""
 
-    def inertia(self, mass: float) -> Array:
-        """Principal moments [3] in kg m^2 of the solid with this mass in kg."""
+    def inertia(self, mass: float | Array) -> Array:
+        """Principal moments [..., 3] in kg m^2 of the solid with this mass [...] in kg."""
+
+    def scaled(self, factor: float) -> "Shape":
+        """The same shape, each length times a factor."""
 
     def samples(self, spacing: float, rounding: float) -> Samples:
         """Core samples at most `spacing` m apart, the core inset by `rounding` m."""
@@ -102,9 +105,13 @@ class Sphere:
         """Radius in m."""
         return self.radius
 
-    def inertia(self, mass: float) -> Array:
-        """Principal moments [3] in kg m^2."""
+    def inertia(self, mass: float | Array) -> Array:
+        """Principal moments [..., 3] in kg m^2."""
         return mass_properties.sphere_inertia(mass, self.radius)
+
+    def scaled(self, factor: float) -> "Sphere":
+        """The same shape, each length times a factor."""
+        return Sphere(factor * self.radius)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
         """The centre alone: exact."""
@@ -151,9 +158,14 @@ class Box:
         """Distance of a corner from the centre, in m."""
         return math.hypot(*self.half_extents)
 
-    def inertia(self, mass: float) -> Array:
-        """Principal moments [3] in kg m^2."""
+    def inertia(self, mass: float | Array) -> Array:
+        """Principal moments [..., 3] in kg m^2."""
         return mass_properties.box_inertia(mass, np.array(self.half_extents))
+
+    def scaled(self, factor: float) -> "Box":
+        """The same shape, each length times a factor."""
+        x, y, z = self.half_extents
+        return Box((factor * x, factor * y, factor * z))
 
     def samples(self, spacing: float, rounding: float) -> Samples:
         """Corners, and points along the edges."""
@@ -230,9 +242,13 @@ class Capsule:
         """Distance of a tip from the centre, in m."""
         return self.radius + self.half_length
 
-    def inertia(self, mass: float) -> Array:
-        """Principal moments [3] in kg m^2."""
+    def inertia(self, mass: float | Array) -> Array:
+        """Principal moments [..., 3] in kg m^2."""
         return mass_properties.capsule_inertia(mass, self.radius, self.half_length)
+
+    def scaled(self, factor: float) -> "Capsule":
+        """The same shape, each length times a factor."""
+        return Capsule(factor * self.radius, factor * self.half_length)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
         """Points on the axis; lying flat it has weight 1 in sum, on a tip a third or a half."""

@@ -94,6 +94,7 @@ def _largest(inverse_mass: Array, A: Array) -> float:
 def of_contacts(model: Model, features: Features, state: State, world: int) -> float:
     """Largest stable step in s of a world with the contacts that it has now; inf if free."""
     shares = {} if features.impulse else diagnostics.contact_shares(model, features, state, world)
+    model = model.of_world(world)
     inverse = diagnostics.inverse_masses(model, state, world)
 
     def load(h: float) -> float:

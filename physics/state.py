@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.features import Features
-from physics.jit import LANES
+from physics.jit import LANES, aligned_zeros
 from physics.model import Model
 
 Array = np.ndarray
@@ -101,15 +101,6 @@ class State(NamedTuple):
     def nbytes(self) -> int:
         """Bytes of all arrays."""
         return sum(array.nbytes for array in self)
-
-
-def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
-    """Zeros that begin at a cache line, as vectors of LANES doubles should."""
-    line = 64
-    size = int(np.prod(shape)) * dtype.itemsize
-    room = np.zeros(size + line, dtype=np.uint8)
-    first = -room.ctypes.data % line
-    return room[first : first + size].view(dtype).reshape(shape)
 
 
 def allocate(model: Model, features: Features, count: int) -> State:

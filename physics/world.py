@@ -11,16 +11,17 @@ from physics.features import NO_ROTATION
 from physics.fidelity import Fidelity, resolve
 from physics.group import Work
 from physics.jit import LANES
+from physics.layout import Layout
 from physics.limits import cause_of_divergence, check_step
-from physics.model import Model, build
-from physics.readings import Readings
+from physics.model import Model, build, spread
+from physics.parameters import Parameters, with_parameters
 from physics.readout import WIDTH, make_readout
-from physics.rotation import rotate, rotate_back
 from physics.scene import Body, Drive, Scene
 from physics.schedule import check_threads, share_out
 from physics.state import MOVING, State, allocate
 from physics.state import copy as copy_state
 from physics.validation import array, instance, integer, positive
+from physics.variation import Variation, spin_momentum
 
 Array = np.ndarray
 
@@ -31,9 +32,10 @@ class Snapshot(NamedTuple):
     scene: Scene
     fidelity: Fidelity
     state: State
+    parameters: Parameters | None = None  # of varied worlds
 
 
-class World(Readings):
+class World(Variation):
     """`count` copies of a scene, advanced together.
 
     Args:
@@ -42,6 +44,8 @@ class World(Readings):
         count: number of worlds, at least 1.
         threads: to share the worlds out over; all cores if None. Results don't depend on it.
         allow_unstable: accept what makes the fidelity's step too long, see Raises.
+        varied: worlds may have masses, friction, restitution and sizes of their own, see
+            `set_parameters`. Worlds that are all alike go without, and are quicker.
 
     Raises:
         TypeError, ValueError: a bad argument; a step that is too long for the scene, see
@@ -56,6 +60,7 @@ class World(Readings):
         threads: int | None = None,
         *,
         allow_unstable: bool = False,
+        varied: bool = False,
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene: Scene = instance("scene", scene, Scene)
@@ -63,16 +68,22 @@ class World(Readings):
         self.count = integer("count", count, low=1)
         self.threads = check_threads(threads)
         self._bodies = len(scene.bodies)
-        self._model: Model
-        self._model, self._features = build(scene, self.fidelity)
+        self._base: Model
+        varied = instance("varied", varied, bool)
+        self._base, self._features = build(scene, self.fidelity, varied)
+        self._model = spread(self._base, self.count) if varied else self._base
+        self._layout = Layout.of(scene, self.fidelity) if varied else None
+        self._parameters = Parameters.of(scene, self.count) if varied else Parameters.of(scene)
+        self._checked: tuple[Parameters, Parameters] | None = None
+        self._allow_unstable = instance("allow_unstable", allow_unstable, bool)
         if not allow_unstable:
-            check_step(scene, self.fidelity, self._model, self._features)
+            check_step(scene, self.fidelity, self._base, self._features)
         self._find_kernels()
         self._idle: list[Work] = []
         self._sides_between: dict[tuple[int, int], Array] = {}
         self._settled = False
-        self._rows = np.empty((self.count, len(self._model.mover), WIDTH))
-        self._state = allocate(self._model, self._features, self.count)
+        self._rows = np.empty((self.count, len(self._base.mover), WIDTH))
+        self._state = allocate(self._base, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
         self._span, self._substeps = math.nan, 0
         self._initial = self._initial_rows()
@@ -96,20 +107,26 @@ class World(Readings):
             velocity = np.array([b.linear_velocity for b in bodies])
             spin = np.array([b.angular_velocity for b in bodies])
             turn = np.array([b.orientation for b in bodies])
-            rows["momentum"][: len(bodies)] = velocity / self._inverse_mass[:, None]
-            rows["angular_momentum"][: len(bodies)] = self._spin_momentum(turn, spin)
+            inertia = self._base.mover["inertia"][: len(bodies)]
+            inverse_mass = self._base.mover["inverse_mass"][: len(bodies)]
+            rows["momentum"][: len(bodies)] = velocity / inverse_mass[:, None]
+            rows["angular_momentum"][: len(bodies)] = spin_momentum(inertia, turn, spin)
         return rows
 
     def _reset(self, worlds: Array) -> None:
         """Puts the chosen worlds into the scene's state, at time zero."""
         self._state.mover[worlds] = self._initial
+        if self._features.varied:  # the scene's velocities, with masses of their own
+            mover, bodies = self._state.mover, self._bodies
+            velocity = np.array([b.linear_velocity for b in self.scene.bodies]).reshape(-1, 3)
+            spin = np.array([b.angular_velocity for b in self.scene.bodies]).reshape(-1, 3)
+            turn = np.array([b.orientation for b in self.scene.bodies]).reshape(-1, 4)
+            chosen = np.flatnonzero(worlds)
+            inverse, inertia = (self._of_bodies(x, chosen) for x in ("inverse_mass", "inertia"))
+            mover["momentum"][worlds, :bodies] = velocity / inverse[..., None]
+            mover["angular_momentum"][worlds, :bodies] = spin_momentum(inertia, turn, spin)
         self._state.world["time"][worlds] = 0.0
         self._forget(worlds)
-
-    def _spin_momentum(self, orientation: Array, spin: Array) -> Array:
-        """L = R J0 R^T omega, [..., bodies, 3]."""
-        inertia = self._model.mover["inertia"][: self._bodies]
-        return rotate(orientation, inertia * rotate_back(orientation, spin))
 
     def _forget(self, worlds: Array) -> None:
         """Clears what is hidden: candidates, contact memories, forces, divergence."""
@@ -150,7 +167,7 @@ class World(Readings):
             try:
                 work = idle.pop()
             except IndexError:  # as many as threads are made, once
-                work = Work.of(model, self._features)
+                work = Work.of(self._base, self._features)
             failed = kernel(model, state, work, rows, worlds, first, last, h, substeps, together)
             idle.append(work)
             return failed
@@ -170,7 +187,11 @@ class World(Readings):
 
     def _raise_diverged(self, h: float, worlds: list[int]) -> None:
         world = worlds[0]
-        cause = cause_of_divergence(self.scene, self.fidelity, self._model, self._features, h)
+        scene = self.scene
+        if self._features.varied:
+            scene = with_parameters(scene, self._parameters.pick([world]))
+        model = self._model.of_world(world)
+        cause = cause_of_divergence(scene, self.fidelity, model, self._features, h)
         raise SimulationDiverged(
             world,
             int(self._state.world["diverged"][world]) - 1,
@@ -300,18 +321,19 @@ class World(Readings):
         if "orientation" in new:
             state.mover["orientation"][mask, :bodies] = new["orientation"]
         if "linear_velocity" in new:
-            state.mover["momentum"][mask, :bodies] = (
-                new["linear_velocity"] / self._inverse_mass[:, None]
-            )
+            inverse = self._of_bodies("inverse_mass", np.flatnonzero(mask))
+            state.mover["momentum"][mask, :bodies] = new["linear_velocity"] / inverse[..., None]
         if spin is not None:
             turn = state.mover["orientation"][mask, :bodies]
-            state.mover["angular_momentum"][mask, :bodies] = self._spin_momentum(turn, spin)
+            state.mover["angular_momentum"][mask, :bodies] = spin_momentum(
+                self._of_bodies("inertia", np.flatnonzero(mask)), turn, spin
+            )
         if "drive_position" in new:
             state.mover["position"][mask, bodies:] = new["drive_position"]
             state.mover["reference"][mask, bodies:] = new["drive_position"]
             state.mover["reference_velocity"][mask, bodies:] = 0.0
         if "drive_velocity" in new:
-            inverse = self._model.mover["inverse_mass"][bodies:, None]
+            inverse = self._base.mover["inverse_mass"][bodies:, None]
             state.mover["momentum"][mask, bodies:] = new["drive_velocity"] / inverse
         if "time" in new:
             state.world["time"][mask] = new["time"]
@@ -346,7 +368,8 @@ class World(Readings):
 
     def snapshot(self) -> Snapshot:
         """Everything the worlds hold; `restore` continues from it to the last bit."""
-        return Snapshot(self.scene, self.fidelity, copy_state(self._state))
+        own = self.parameters if self._features.varied else None
+        return Snapshot(self.scene, self.fidelity, copy_state(self._state), own)
 
     def restore(self, saved: Snapshot) -> None:
         """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
@@ -360,10 +383,16 @@ class World(Readings):
             what = f"fidelity: {', '.join(fields)}"
         elif saved.scene != self.scene:
             what = "scene"
+        elif (saved.parameters is not None) != self._features.varied:
+            what = f"varied: {saved.parameters is not None}"
         else:
             what = ""
         if what:
             raise ValueError(f"saved must be of the same worlds; it has another {what}")
+        if saved.parameters is not None:
+            pairs = zip(self._parameters, saved.parameters, strict=True)
+            other = np.any([np.any(mine != theirs, axis=1) for mine, theirs in pairs], axis=0)
+            self._write_parameters(other, saved.parameters.pick(other))
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
         self._rows_valid = self._settled = False

@@ -9,6 +9,8 @@ import numpy as np
 Array = np.ndarray
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+# of the streams beside the first; odd as the other, and any number
+_STREAM = np.uint64(0xD1B54A32D192ED03)
 
 
 def _mix(x: Array) -> Array:
@@ -18,19 +20,37 @@ def _mix(x: Array) -> Array:
     return x ^ (x >> np.uint64(31))
 
 
-def uniform(seeds: Array, episodes: Array, count: int) -> Array:
+def uniform(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:
     """Uniform numbers in [0, 1[.
 
     Args:
         seeds: [n] non-negative integers.
         episodes: [n] non-negative integers.
         count: draws to each.
+        stream: one of many sequences that have nothing to do with each other, or [n] of them.
 
     Returns:
         [n, count]
     """
     key = _mix(seeds.astype(np.uint64) + _GOLDEN)
     key = _mix(key + (episodes.astype(np.uint64) + np.uint64(1)) * _GOLDEN)
+    if np.any(stream):
+        streams = np.asarray(stream).astype(np.uint64)
+        key = np.where(streams == 0, key, _mix(key + streams * _STREAM))
     steps = (np.arange(count, dtype=np.uint64) + np.uint64(1)) * _GOLDEN
     bits = _mix(key[:, None] + steps)
     return (bits >> np.uint64(11)) * 2.0**-53
+
+
+def normal(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:
+    """Gaussian numbers [n, count] of mean 0 and deviation 1, from pairs of `uniform` (Box-Muller).
+
+    Args:
+        seeds: [n] non-negative integers.
+        episodes: [n] non-negative integers.
+        count: draws to each.
+        stream: see `uniform`.
+    """
+    draws = uniform(seeds, episodes, 2 * count, stream)
+    size = np.sqrt(-2.0 * np.log1p(-draws[:, :count]))
+    return np.asarray(size * np.cos(2.0 * np.pi * draws[:, count:]))

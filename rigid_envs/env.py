@@ -27,6 +27,9 @@ class RigidEnv(gym.Env[Observation, Array]):
         render_size: width and height of a picture in pixels.
         max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
         terminate_on_success: end an episode when it is solved.
+        randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
+            see `rigid_envs.randomization.Randomization`.
+        observe_parameters: what `randomize` names is observed too.
         **arguments: of the task, as `blocks`.
     """
 
@@ -43,6 +46,8 @@ class RigidEnv(gym.Env[Observation, Array]):
         render_size: int = 480,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
+        randomize: Any = None,
+        observe_parameters: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the world; an episode begins with `reset`."""
@@ -55,6 +60,8 @@ class RigidEnv(gym.Env[Observation, Array]):
             1,
             max_episode_steps,
             terminate_on_success,
+            randomize,
+            observe_parameters,
             **arguments,
         )
         self._pictures = Pictures(
@@ -73,17 +80,19 @@ class RigidEnv(gym.Env[Observation, Array]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode: the seed's first, or the next one.
 
+        options["randomize"] gives other ranges from this episode on; None, the constructor's.
+
         Raises:
             TypeError, ValueError: a bad seed, an unknown option.
         """
-        if options:
-            raise ValueError(f"options must be None or empty, got {options!r}")
+        if set(options or {}) - {"randomize"}:
+            raise ValueError(f'options knows only "randomize", got {options!r}')
         seed = None if seed is None else check_seed("seed", seed)
         super().reset(seed=seed)
         if seed is None and not self._runner.seeded:
             seed = int(self.np_random.integers(2**31))
         seeds = None if seed is None else np.array([seed])
-        self._runner.reset(np.ones(1, dtype=bool), seeds)
+        self._runner.reset(np.ones(1, dtype=bool), seeds, options)
         observation, info = self._runner.observe()
         if self.render_mode == "human":
             self.render()

@@ -8,17 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-from physics import Fidelity, World
-from physics.validation import choice, integer
+from physics import Fidelity, Parameters, Snapshot, World
+from physics.validation import choice, instance, integer
 from rigid_envs.draws import uniform
 from rigid_envs.goals import judge
+from rigid_envs.randomization import Randomization
 from rigid_envs.rewards import REWARD_TYPES
 from rigid_envs.tasks import TASKS, Task
 
 Array = np.ndarray
 Observation = dict[str, Array]
 
-STATE_VERSION = 1
+STATE_VERSION = 2
 # so that a seed plus a world's index is an int64 too
 LARGEST_SEED = 2**62
 
@@ -51,6 +52,8 @@ class Runner:
         threads: to share the worlds out over; all cores if None.
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
+        randomize: ranges of parameters that are drawn for each episode, see `Randomization`.
+        observe_parameters: what `randomize` names is observed too.
         **arguments: of the task, where it is given by its name or class.
     """
 
@@ -63,12 +66,20 @@ class Runner:
         threads: int | None = None,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
+        randomize: Any = None,
+        observe_parameters: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the world; episodes begin with `reset`."""
         self.task = _make_task(task, arguments)
         self.reward_type = choice("reward_type", reward_type, REWARD_TYPES)
-        self.world = World(self.task.scene(), fidelity, count, threads)
+        scene = self.task.scene()
+        self.randomization = Randomization(scene, count, randomize, self.task.sizes)
+        ranges = self.randomization.check(randomize)
+        varied = self.randomization.needs_varied(ranges)
+        self.world = World(scene, fidelity, count, threads, varied=varied)
+        if varied:
+            self.randomization.check_step(self.world, ranges)
         self.count = count
         if max_episode_steps is not None:
             max_episode_steps = integer("max_episode_steps", max_episode_steps, low=1)
@@ -77,7 +88,14 @@ class Runner:
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
 
-        low, high = _limits(self.task.bounds)
+        self.observe_parameters: bool = instance("observe_parameters", observe_parameters, bool)
+        if self.observe_parameters and not self.randomization.bounds:
+            raise ValueError(
+                "observe_parameters needs randomize, whose ranges bound what is observed"
+            )
+        seen = self.randomization.bounds if self.observe_parameters else ()
+        self.bounds = (*self.task.bounds, *seen)
+        low, high = _limits(self.bounds)
         goal_low, goal_high = _limits(self.task.goal_bounds)
         self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
         self.observation_space = spaces.Dict(
@@ -98,22 +116,55 @@ class Runner:
         self._apart = np.zeros(count)
         self._goals = np.zeros((count, len(goal_low)), dtype=np.float32)
 
-    def reset(self, mask: Array, seeds: Array | None = None) -> None:
+    def reset(
+        self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
+    ) -> None:
         """Starts an episode in the worlds of the mask [count]: their next, or a seed's first.
 
         Args:
             mask: [count] bool.
             seeds: [count] non-negative; a world without a seed so far needs one.
+            options: "randomize": ranges for these worlds from now on, in place of the runner's; its
+                own again if None.
+
+        Raises:
+            TypeError, ValueError: bad ranges, or such that the step is too long for; nothing has
+                changed then.
         """
+        if options and "randomize" in options:
+            self._randomize(mask, options["randomize"])
         if seeds is not None:
             self._seeds[mask] = seeds[mask]
             self._episodes[mask] = -1
         self._episodes[mask] += 1
         self._seeded = bool(np.all(self._episodes >= 0))
         self._elapsed[mask] = 0
+        self.randomization.draw(self.world, mask, self._seeds[mask], self._episodes[mask])
         draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draws)
         self._goals[mask] = self.task.start(self.world, mask, draws)
         self._now = self.world.read()
+
+    def _randomize(self, mask: Array, randomize: Any) -> None:
+        """Gives the worlds of a mask ranges of their own."""
+        if randomize is None:
+            self.randomization.set_ranges(mask, None)
+            return
+        ranges = self.randomization.check(randomize)
+        if self.observe_parameters:
+            self.randomization.check_observed(ranges)
+        if self.randomization.needs_varied(ranges):
+            self._vary()
+            self.randomization.check_step(self.world, ranges)
+        self.randomization.set_ranges(mask, ranges)
+
+    def _vary(self) -> None:
+        """Lets worlds differ that were built alike; they carry on as they are, to the last bit."""
+        alike = self.world
+        if not alike.features.varied:
+            count = self.count
+            self.world = World(alike.scene, alike.fidelity, count, alike.threads, varied=True)
+            own = Parameters.of(alike.scene, count)
+            self.world.restore(alike.snapshot()._replace(parameters=own))
 
     @property
     def seeded(self) -> bool:
@@ -127,9 +178,11 @@ class Runner:
 
     def observe(self) -> tuple[Observation, dict[str, Array]]:
         """Observation, and what is told beside it: info, [count] each."""
-        now, split = self._now, len(self.task.bounds)
+        now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
         values = np.empty((self.count, len(self._low)), dtype=np.float32)
-        self.task.observe(self.world, now, values[:, :split])
+        self.task.observe(self.world, now, values[:, :seen])
+        if self.observe_parameters:
+            values[:, seen:split] = self.randomization.observed
         values[:, split:] = self.task.achieved(self.world, now)
         self._apart, outside = judge(values, self._low, self._high, self._goals)
         achieved, desired = values[:, split:], self._goals.copy()
@@ -180,7 +233,12 @@ class Runner:
             ValueError: see `check_actions`.
             SimulationDiverged: a world turned non-finite; the others are whole.
         """
-        self.task.act(self.world, self._now, self.check_actions(actions))
+        commands = self.check_actions(actions)
+        if self.randomization.noisy:
+            commands = self.randomization.disturb(
+                commands, self._seeds, self._episodes, self._elapsed
+            )
+        self.task.act(self.world, self._now, commands)
         if begun is None or not begun.any():
             begun = None
         # first, as the other worlds advance even if one of them diverges
@@ -218,6 +276,7 @@ class Runner:
             "episodes": self._episodes.copy(),
             "elapsed": self._elapsed.copy(),
             "goals": self._goals.copy(),
+            **self.randomization.get_state(),
         }
 
     def set_state(self, state: Any) -> None:
@@ -226,14 +285,20 @@ class Runner:
         Raises:
             ValueError: not such a state, another version, or another scene, fidelity or count.
         """
-        wanted = {"version", "world", "seeds", "episodes", "elapsed", "goals"}
+        wanted = {"version", "world", "seeds", "episodes", "elapsed", "goals", "ranges", "drawn"}
         if not isinstance(state, dict) or set(state) != wanted:
             raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
         if state["version"] != STATE_VERSION:
             raise ValueError(
                 f"state has version {state['version']!r}, this is version {STATE_VERSION}"
             )
-        self.world.restore(state["world"])
+        saved = state["world"]
+        if isinstance(saved, Snapshot) and saved.parameters is not None:
+            self._vary()
+        elif isinstance(saved, Snapshot) and self.world.features.varied:
+            saved = saved._replace(parameters=Parameters.of(saved.scene, len(saved.state.world)))
+        self.world.restore(saved)
+        self.randomization.set_state(state)
         self._now = self.world.read()
         self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
         self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]

@@ -23,9 +23,12 @@ THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
 def items(runner: Runner, world: int, *, particles: bool = False) -> list[Item]:
     """Bodies, drives and statics of one world, as particles if asked for; and grippers' arms."""
     engine, scene = runner.world, runner.world.scene
+    sizes = np.ones(len(scene.bodies))
+    if engine.features.varied:
+        sizes = engine.parameters.size[world]
     found = [
         Item(
-            body.shape,
+            body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i])),
             engine.position[world, i],
             engine.orientation[world, i],
             BODY_COLORS[i % len(BODY_COLORS)],

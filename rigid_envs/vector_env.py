@@ -34,6 +34,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         render_size: width and height of a world's picture in pixels.
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
+        randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
+            see `rigid_envs.randomization.Randomization`.
+        observe_parameters: what `randomize` names is observed too.
         autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as gymnasium.vector.AutoresetMode.
         threads: to share the worlds out over; all cores if None.
         **arguments: of the task, as `blocks`.
@@ -60,6 +63,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        randomize: Any = None,
+        observe_parameters: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the worlds; episodes begin with `reset`."""
@@ -75,6 +80,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             threads,
             max_episode_steps,
             terminate_on_success,
+            randomize,
+            observe_parameters,
             **arguments,
         )
         self._pictures = Pictures(
@@ -94,6 +101,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts episodes in all worlds, or in those of options["reset_mask"] [num_envs].
 
+        options["randomize"] gives these worlds other ranges from now on; None, the constructor's.
+
         Raises:
             TypeError, ValueError: a bad seed, an unknown option, a mask of the wrong shape.
         """
@@ -101,7 +110,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         super().reset(seed=None if seeds is None else int(seeds[0]))
         if seeds is None and not self._runner.seeded:
             seeds = self._seeds(int(self.np_random.integers(2**31)))
-        self._runner.reset(mask, seeds)
+        self._runner.reset(mask, seeds, options)
         self._ended &= ~mask
         observation, info = self._runner.observe()
         return observation, _with_masks(info, self.num_envs)
@@ -109,8 +118,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     def _reset_mask(self, options: dict[str, Any] | None) -> Array:
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
+        options.pop("randomize", None)
         if options:
-            raise ValueError(f'options knows only "reset_mask", got {sorted(options)}')
+            raise ValueError(
+                f'options knows only "reset_mask" and "randomize", got {sorted(options)}'
+            )
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
         mask = np.asarray(mask)

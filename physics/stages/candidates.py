@@ -12,7 +12,7 @@ import math
 from functools import cache
 
 from physics.group import count_slots
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
 from physics.stages.manifold import make_choose, note
 from physics.stages.relative import relative_pose
@@ -25,15 +25,16 @@ def make_search(features):
     friction = features.friction and not features.viscous  # what it remembers
     impulse, resistance = features.impulse, features.resistance
     sphere, box, capsule = features.sphere, features.box, features.capsule
-    particles = features.particles
+    particles, varied = features.particles, features.varied
 
     @kernel
-    def distance(side, x, y, z):
-        kind, a, b, c = side.kind, side.core[0], side.core[1], side.core[2]
+    def distance(side, i, x, y, z):
+        kind, core = side.kind, side.core
+        a, b, c = at(core[0], i), at(core[1], i), at(core[2], i)
         d, nx, ny, nz = z, 0.0, 0.0, 1.0
         if box and kind == BOX:
             sharp = side.sharp != 0
-            d, nx, ny, nz, _ = box_distance(x, y, z, a, b, c, 0.0, side.radius, sharp)
+            d, nx, ny, nz, _ = box_distance(x, y, z, a, b, c, 0.0, at(side.radius, i), sharp)
         if sphere and kind == SPHERE:
             d, nx, ny, nz = sphere_distance(x, y, z, a, b, c)
         if capsule and kind == CAPSULE:
@@ -119,21 +120,28 @@ def make_search(features):
         candidate = state.candidate[g, first : first + room]
         ids = state.sample_id[g, first : first + room]
         R, c = seen.rotation, seen.position
-        height = side.core[0] if side.kind == PLANE else 0.0
-        radius = side.radius
+        height = at(side.core[0], i) if side.kind == PLANE else 0.0
+        radius, share = at(side.radius, i), at(side.share, i)
         n = 0
         cursor = 0
         nearest = 1e300
         for s in range(side.sample_count):
             sample = model.sample[side.first_sample + s]
-            sx, sy, sz, weight = sample[0], sample[1], sample[2], sample[3]
+            sx, sy, sz, weight = sample[0], sample[1], sample[2], share * sample[3]
+            if varied:
+                size = at(side.owner_size, i)
+                sx, sy, sz = size * sx, size * sy, size * sz
             x = R[0, i] * sx + R[1, i] * sy + R[2, i] * sz + c[0, i]
             y = R[3, i] * sx + R[4, i] * sy + R[5, i] * sz + c[1, i]
             z = R[6, i] * sx + R[7, i] * sy + R[8, i] * sz + c[2, i] - height
             if particles and side.partner_count > 0:
                 for j in range(side.partner_count):
                     p = model.sample[side.first_partner + j]
-                    ux, uy, uz = x - p[0], y - p[1], z - p[2]
+                    px, py, pz = p[0], p[1], p[2]
+                    if varied:
+                        size = at(side.surface_size, i)
+                        px, py, pz = size * px, size * py, size * pz
+                    ux, uy, uz = x - px, y - py, z - pz
                     gap = math.sqrt(ux * ux + uy * uy + uz * uz) - radius
                     if gap < reach and n == room:
                         state.world[g * LANES + i].overflow = 1
@@ -141,14 +149,15 @@ def make_search(features):
                         key = s * side.partner_count + j
                         shared = min(weight, p[3])
                         cursor = keep(candidate[n], i, old, cursor, count, key, sx, sy, sz, shared)
-                        for axis in range(3):
-                            candidate[n].partner[axis, i] = p[axis]
+                        candidate[n].partner[0, i] = px
+                        candidate[n].partner[1, i] = py
+                        candidate[n].partner[2, i] = pz
                         ids[n, i] = key
                         n += 1
                     elif gap < nearest:
                         nearest = gap
             else:
-                gap, nx, ny, nz = distance(side, x, y, z)
+                gap, nx, ny, nz = distance(side, i, x, y, z)
                 gap -= radius
                 if gap < reach:
                     if impulse:
@@ -182,11 +191,11 @@ def make_search(features):
         c = seen.position
         # far apart as a whole: bounding spheres, or a bounding sphere over a plane
         if side.kind == PLANE:
-            gap = c[2, i] - side.core[0] - side.owner_reach
+            gap = c[2, i] - at(side.core[0], i) - at(side.owner_reach, i)
         else:
             far = math.sqrt(c[0, i] * c[0, i] + c[1, i] * c[1, i] + c[2, i] * c[2, i])
-            gap = far - side.owner_reach - side.surface_reach
-        reach = side.skin
+            gap = far - at(side.owner_reach, i) - at(side.surface_reach, i)
+        reach = at(side.skin, i)
         if impulse and side.partner_count == 0:
             # what is met by the middle of the next drift collides before it overlaps
             reach = max(reach, 0.5 * path)
@@ -234,7 +243,7 @@ def make_side_search(features):
 
     @kernel
     def side_search(model, state, work, g, k, least):
-        """In the active lanes whose travel is below `least` [m] or the last drift's path.
+        """In the active lanes whose travel is below `least` of the skin or the last drift's path.
 
         The impulse law chooses among the candidates of a pair, so both its sides are searched.
         """
@@ -245,7 +254,7 @@ def make_side_search(features):
         back = look(work, model.side[mirror], work.relative[1]) if mirror >= 0 else seen
         for i in range(LANES):
             path = relative_path(owner.moved, surface.moved, owner.swept, surface.swept, i)
-            if work.lane[0].active[i] and meeting.travel[i] < max(least, path):
+            if work.lane[0].active[i] and meeting.travel[i] < max(least * at(side.skin, i), path):
                 search(model, state, work, g, k, i, seen, 0, path)
                 if mirror >= 0:
                     search(model, state, work, g, mirror, i, back, meeting.count[i], path)
@@ -270,7 +279,7 @@ def make_candidates(features):
     def candidates(model, state, work, g, opens):
         for k in range(model.side.shape[0]):
             side = model.side[k]
-            least = 0.5 * side.skin if opens else 0.0
+            least, skin = 0.5 if opens else 0.0, side.skin
             travel = work.side[k].travel
             owner, surface = work.solid[side.owner], work.solid[side.surface]
             first, second, turned, swept = owner.moved, surface.moved, owner.swept, surface.swept
@@ -279,7 +288,7 @@ def make_candidates(features):
                 path = relative_path(first, second, turned, swept, i)
                 left = travel[i] - path
                 travel[i] = left
-                spent += 1 if left < max(path, least) else 0
+                spent += 1 if left < max(path, least * at(skin, i)) else 0
             if spent > 0:
                 side_search(model, state, work, g, k, least)
 

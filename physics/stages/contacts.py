@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from physics.group import clear_pressed, note_touch
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
@@ -48,21 +48,25 @@ def make_loop(features, kind, report):
     def loop(slots, candidate, seen, constants, h, rows):
         R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
         force, torque, pressed = seen.force, seen.torque, seen.pressed
-        radius, owner_radius = constants.radius, constants.owner_radius
-        ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
-        k, a, floor = constants.stiffness, constants.damping, constants.rest_speed
-        shear_k, shear_c = constants.shear_stiffness, constants.shear_damping
-        mu, mass_rates, bearing = constants.friction, seen.mass_rate, seen.bearing
-        inverse_mass = 1.0 / constants.pair_mass
+        radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
+        stiffness, damping, floors = constants.stiffness, constants.damping, constants.rest_speed
+        shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
+        frictions, mass_rates, bearing = constants.friction, seen.mass_rate, seen.bearing
+        pair_mass = constants.pair_mass
         sharp = constants.sharp != 0
         rolling, spinning = constants.rolling, constants.spinning
-        twist_k, twist_c = constants.twist_stiffness, constants.twist_damping
+        twist_stiffness, twist_damping = constants.twist_stiffness, constants.twist_damping
         for n in range(slots):
             row = candidate[n]
             weights, memories, loads = row.weight, row.impact_speed, row.load
             befores = row.approach
             for i in range(LANES):
-                weight = weights[i]
+                weight, mu = weights[i], at(frictions, i)
+                radius, owner_radius = at(radii, i), at(owner_radii, i)
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                k, a, floor = at(stiffness, i), at(damping, i), at(floors, i)
+                shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
+                inverse_mass = 1.0 / at(pair_mass, i)
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
@@ -153,8 +157,8 @@ def make_loop(features, kind, report):
                         nx,
                         ny,
                         nz,
-                        twist_k,
-                        twist_c,
+                        at(twist_stiffness, i),
+                        at(twist_damping, i),
                         rolling,
                         spinning,
                         h,
@@ -246,8 +250,9 @@ def begin_side(model, work, k, h, seen):
     """
     meeting, side, active = work.side[k], model.side[k], work.lane[0].active
     other = work.side[max(side.mirror, 0)]
-    rate = side.pair_mass / h if h > 0.0 else 0.0
+    pair_mass = side.pair_mass
     for i in range(LANES):
+        rate = at(pair_mass, i) / h if h > 0.0 else 0.0
         share = meeting.bore[i] + (other.bore[i] if side.mirror >= 0 else 0.0)
         seen.mass_rate[i] = rate / share if share > 0.0 else 0.0
         seen.lasts[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0

@@ -34,7 +34,11 @@ holds nothing still; that makes it the cheapest.
 
 import math
 
+import numpy as np
+
 from physics.jit import stage
+
+Array = np.ndarray
 
 # cones of damping beyond the first that a lasting contact may remember: a body that slides to rest
 # needs several on its rear edge, which bears a third of the mean
@@ -42,9 +46,9 @@ _AT_REST = 10.0
 
 
 def tangential_coefficients(
-    stiffness: float, pair_mass: float, shear_mass: float, leverage: float, step: float
-) -> tuple[float, float]:
-    """Shear stiffness N/m and damping N s/m of a pair.
+    stiffness: Array, pair_mass: Array, shear_mass: Array, leverage: Array, step: float
+) -> tuple[Array, Array]:
+    """Shear stiffness N/m and damping N s/m of pairs, of any shape that broadcasts.
 
     Args:
         stiffness: N/m, normal.
@@ -60,7 +64,8 @@ def tangential_coefficients(
     # a body that pitches between two others: a tower chatters and creeps apart
     k = 1.0 / 3.0 * stiffness * shear_mass / pair_mass
     rocking = 2.0 * k * pair_mass * (1.0 + leverage * k / stiffness)
-    return k, 0.5 * (math.sqrt(4.0 / 3.0 * (k * step) ** 2 + 4.0 * rocking) - k * step)
+    slow = k * step
+    return k, 0.5 * (np.sqrt(4.0 / 3.0 * (slow * slow) + 4.0 * rocking) - slow)
 
 
 @stage

@@ -1,6 +1,6 @@
 """Gravity: a uniform field makes no torque. It comes first and so clears the last step's sums."""
 
-from physics.jit import LANES, stage
+from physics.jit import LANES, at, stage
 
 
 @stage
@@ -10,9 +10,9 @@ def gravity(model, work):
         force, torque, weight = work.solid[m].force, work.solid[m].torque, model.mover[m].weight
         wx, wy, wz = weight[0], weight[1], weight[2]
         for i in range(LANES):
-            force[0, i] = wx
-            force[1, i] = wy
-            force[2, i] = wz
+            force[0, i] = at(wx, i)
+            force[1, i] = at(wy, i)
+            force[2, i] = at(wz, i)
             torque[0, i] = 0.0
             torque[1, i] = 0.0
             torque[2, i] = 0.0

@@ -19,7 +19,7 @@ The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the fac
 import math
 from functools import cache
 
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.stages.drives import make_join_speeds
 from physics.stages.points import cross, ends, give, slip
 
@@ -31,10 +31,11 @@ SMALL, ROUNDS = 1e-6, 64
 @kernel
 def find(points, owner, surface, constants, h, lane):
     """Notes the restitution of each point that collides, -1 of others, and which lanes have one."""
-    e, floor = constants.restitution, constants.rest_speed
+    restitution, floors = constants.restitution, constants.rest_speed
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
+            e, floor = at(restitution, i), at(floors, i)
             ux, uy, uz = slip(owner, surface, point, i)
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
             un = ux * nx + uy * ny + uz * nz
@@ -103,7 +104,7 @@ def make_press(features):
                     qx = px - m * (ux - un * nx)
                     qy = py - m * (uy - un * ny)
                     qz = pz - m * (uz - un * nz)
-                    limit = mu * new
+                    limit = at(mu, i) * new
                     size = math.sqrt(qx * qx + qy * qy + qz * qz)
                     cut = limit / size if size > limit else 1.0
                     qx = cut * qx if part else px

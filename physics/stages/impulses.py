@@ -26,7 +26,7 @@ import math
 from functools import cache
 
 from physics.group import clear_pressed, note_touch
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.stages.drives import make_join_speeds
 from physics.stages.impacts import make_impacts
 from physics.stages.kinematics import turned_back
@@ -74,13 +74,16 @@ def make_sweep(features):
     @kernel
     def sweep(points, owner, surface, A, B, ma, mb, constants, h, soft):
         """`soft`: with the bias that pushes overlaps apart, and the softness that goes with it."""
-        mu, floor = constants.friction, constants.rest_speed
-        K, C = constants.stiffness, constants.damping
+        frictions, floors = constants.friction, constants.rest_speed
+        stiffness, damping = constants.stiffness, constants.damping
         rolling, spinning = constants.rolling, constants.spinning
-        rate, per_h = K / (C + h * K), 1.0 / h
+        per_h = 1.0 / h
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
+                mu, floor = at(frictions, i), at(floors, i)
+                K, C = at(stiffness, i), at(damping, i)
+                rate = K / (C + h * K)
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 gap, weight, m, push = point.gap[i], point.weight[i], point.mass[i], point.push[i]
                 ux, uy, uz = slip(owner, surface, point, i)
@@ -258,8 +261,9 @@ def outside(model, work, h):
     for m in range(model.mover.shape[0]):
         solid, entry = work.solid[m], work.tensor[m].entry
         v, omega, F, T = solid.velocity, solid.spin, solid.force, solid.torque
-        step = h * model.mover[m].inverse_mass
+        inverse_mass = model.mover[m].inverse_mass
         for i in range(LANES):
+            step = h * at(inverse_mass, i)
             v[0, i] += step * F[0, i]
             v[1, i] += step * F[1, i]
             v[2, i] += step * F[2, i]

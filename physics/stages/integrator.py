@@ -9,7 +9,7 @@ ahead.
 from functools import cache
 
 from physics.features import GENERAL, NO_ROTATION
-from physics.jit import LANES, stage
+from physics.jit import LANES, at, stage
 from physics.rotation import SMALL_TURN, turn, turn_far
 from physics.stages.kinematics import spin_of
 
@@ -62,6 +62,13 @@ def make_turning(features, turn):
     return turning
 
 
+@stage
+def longest(jx, jy, jz, time):
+    """Square of the angular momentum up to which a turn counts as small."""
+    fastest = time * max(jx, jy, jz)
+    return SMALL_TURN * SMALL_TURN / (fastest * fastest)
+
+
 @cache
 def make_drift(features):
     """Stage that moves and turns every mover for a time, and tells how far its surface may go."""
@@ -80,10 +87,13 @@ def make_drift(features):
                 solid.moved,
                 solid.swept,
             )
-            step, reach = time * constants.inverse_mass, time * constants.reach
-            j = constants.inverse_inertia
-            jx, jy, jz = j[0], j[1], j[2]
+            inverse_mass, reaches, j = (
+                constants.inverse_mass,
+                constants.reach,
+                constants.inverse_inertia,
+            )
             for i in range(LANES):
+                step = time * at(inverse_mass, i)
                 dx, dy, dz = step * P[0, i], step * P[1, i], step * P[2, i]
                 c[0, i] += dx
                 c[1, i] += dy
@@ -94,10 +104,10 @@ def make_drift(features):
                 swept[i] = 0.0
             if rotation == NO_ROTATION or not constants.turns:
                 continue
-            fastest = time * max(jx, jy, jz)
-            square = SMALL_TURN * SMALL_TURN / (fastest * fastest)
             far = 0
             for i in range(LANES):
+                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
+                square, reach = longest(jx, jy, jz, time), time * at(reaches, i)
                 x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
                 nx, ny, nz, nw, ox, oy, oz = turning(x, y, z, w, jx, jy, jz, lx, ly, lz, time)
@@ -111,6 +121,8 @@ def make_drift(features):
                 far += 0 if near else 1
             if far > 0:
                 for i in range(LANES):
+                    jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
+                    square, reach = longest(jx, jy, jz, time), time * at(reaches, i)
                     lx, ly, lz = L[0, i], L[1, i], L[2, i]
                     if not lx * lx + ly * ly + lz * lz <= square:
                         x, y, z, w, ox, oy, oz = turning_far(

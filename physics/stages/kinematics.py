@@ -3,7 +3,7 @@
 from functools import cache
 
 from physics.features import GENERAL, NO_ROTATION
-from physics.jit import LANES, stage
+from physics.jit import LANES, at, stage
 from physics.rotation import rotation_entries
 
 
@@ -101,17 +101,17 @@ def make_kinematics(features):
             q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
             v, omega = solid.velocity, solid.spin
             inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
-            jx, jy, jz = j[0], j[1], j[2]
             for i in range(LANES):
-                v[0, i] = inverse_mass * P[0, i]
-                v[1, i] = inverse_mass * P[1, i]
-                v[2, i] = inverse_mass * P[2, i]
+                v[0, i] = at(inverse_mass, i) * P[0, i]
+                v[1, i] = at(inverse_mass, i) * P[1, i]
+                v[2, i] = at(inverse_mass, i) * P[2, i]
             if not constants.turns:  # see place_tools
                 continue
             for i in range(LANES):
                 place(solid, i)
             for i in range(LANES):
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
+                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
                 if rotation == NO_ROTATION:
                     ox, oy, oz = 0.0, 0.0, 0.0
                 elif rotation == GENERAL:

@@ -9,7 +9,7 @@ sample can get as deep as the skin is wide, if a body turns about those chosen.
 import math
 from functools import cache
 
-from physics.jit import kernel
+from physics.jit import at, kernel
 from physics.shapes import PARTICLES
 from physics.stages.kinematics import turned
 from physics.stages.points import cross
@@ -189,7 +189,7 @@ def make_choose(features, clear):
             near[j].weight = state.candidate[g, model.side[s].first_slot + slot].weight[i]
             near[j].group = 0
         group = 1
-        while thin_group(near, n, group, side.skin):
+        while thin_group(near, n, group, at(side.skin, i)):
             group += 1
         drop(model, state, work, g, k, i, near[:count])
         if mirror >= 0:

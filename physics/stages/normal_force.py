@@ -29,8 +29,14 @@ zeta = -ln e / sqrt(pi^2 + ln^2 e) gives too high an e; the formula here is for 
 """
 
 import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
 
 from physics.jit import stage
+
+Array = np.ndarray
 
 # of the speed that a contact's load gives it in 1/omega, below which it doesn't count as colliding
 _CALM = 2.0
@@ -38,10 +44,12 @@ _CALM = 2.0
 _LEAST_RESTITUTION = 5e-4
 
 
-def _bisect(function, low: float, high: float) -> float:
+def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
     """Root of an increasing function, to round-off."""
     for _ in range(200):
         middle = 0.5 * (low + high)
+        if middle in (low, high):  # nothing is left between them
+            break
         if function(middle) < 0.0:
             low = middle
         else:
@@ -63,6 +71,14 @@ def clamped_dashpot_restitution(zeta: float) -> float:
     return math.exp(-zeta / over * 2.0 * math.log(zeta + over))
 
 
+def damping_coefficients(restitution: Array, law: str) -> Array:
+    """As `damping_coefficient`, of any number of contacts: each value is worked out once."""
+    values, where = np.unique(restitution, return_inverse=True)
+    found = [damping_coefficient(e, law) for e in values.tolist()]
+    return np.array(found)[where].reshape(restitution.shape)
+
+
+@lru_cache(maxsize=4096)
 def damping_coefficient(restitution: float, law: str) -> float:
     """The law's dimensionless damping: a of "overlap", the damping ratio zeta of "dashpot"."""
     e = max(restitution, _LEAST_RESTITUTION)
@@ -80,17 +96,17 @@ def damping_coefficient(restitution: float, law: str) -> float:
     return -math.expm1(-_bisect(excess, 1.2 * (1.0 - e), 2.0 / e)) / e
 
 
-def rest_speed(damping: float, gravity: float, omega: float) -> float:
+def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:
     """Floor of the impact speed, m/s: a body at rest under its weight is damped half critically.
 
     Args:
-        damping: a of the law.
+        damping: a of the law, of any number of contacts.
         gravity: m/s^2.
-        omega: rad/s, of the contact.
+        omega: rad/s, of each.
     """
     # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega. With all of that a
     # flat or a tall block, whose rocking is faster than its bobbing, would chatter and creep
-    return max(damping * gravity / omega, 1e-9)
+    return np.maximum(damping * gravity / omega, 1e-9)
 
 
 @stage

@@ -7,7 +7,7 @@ next. Unlike the spring law, which needs a point once, they are worked out befor
 import math
 from functools import cache
 
-from physics.jit import LANES, kernel, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.kinematics import turned
 from physics.stages.relative import relative_pose
@@ -40,8 +40,8 @@ def place_tensors(model, work):
                 work.tensor[m].entry,
                 model.mover[m].inverse_inertia,
             )
-            jx, jy, jz = j[0], j[1], j[2]
             for i in range(LANES):
+                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
                 ax, ay, az = jx * R[0, i], jy * R[1, i], jz * R[2, i]
                 bx, by, bz = jx * R[3, i], jy * R[4, i], jz * R[5, i]
                 entry[0, i] = ax * R[0, i] + ay * R[1, i] + az * R[2, i]
@@ -98,12 +98,12 @@ def give(owner, surface, A, B, ma, mb, point, i, px, py, pz):
     A and B are their tensors, ma and mb their inverse masses, 1/kg.
     """
     v, u, omega, spin = owner.velocity, surface.velocity, owner.spin, surface.spin
-    v[0, i] += ma * px
-    v[1, i] += ma * py
-    v[2, i] += ma * pz
-    u[0, i] -= mb * px
-    u[1, i] -= mb * py
-    u[2, i] -= mb * pz
+    v[0, i] += at(ma, i) * px
+    v[1, i] += at(ma, i) * py
+    v[2, i] += at(ma, i) * pz
+    u[0, i] -= at(mb, i) * px
+    u[1, i] -= at(mb, i) * py
+    u[2, i] -= at(mb, i) * pz
     tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], px, py, pz)
     sx, sy, sz = times(A, i, tx, ty, tz)
     omega[0, i] += sx
@@ -142,12 +142,6 @@ def turn(owner, surface, A, B, i, tx, ty, tz):
 
 
 @stage
-def inverse_mass(model, solid):
-    """1/kg, of statics 0."""
-    return model.mover[solid].inverse_mass if solid < model.mover.shape[0] else 0.0
-
-
-@stage
 def ends(model, work, k):
     """What impulses at a side's points need: the points, its solids' tensors and inverse masses."""
     side, slots = model.side[k], work.side[k].slots
@@ -156,8 +150,8 @@ def ends(model, work, k):
         work.point[first : first + slots],
         work.tensor[o].entry,
         work.tensor[s].entry,
-        inverse_mass(model, o),
-        inverse_mass(model, s),
+        side.owner_inverse_mass,
+        side.surface_inverse_mass,
     )
 
 
@@ -173,12 +167,13 @@ def make_place(features, kind):
         """`h` is the time in s in which last step's impulses were given and this one's will be."""
         R, c = seen.rotation, seen.position
         Q, a, b = surface.rotation, owner.position, surface.position
-        radius, owner_radius = constants.radius, constants.owner_radius
-        ca, cb, cc = constants.core[0], constants.core[1], constants.core[2]
-        sharp, inverse_mass = constants.sharp != 0, 1.0 / constants.pair_mass
+        radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
+        sharp, pair_mass = constants.sharp != 0, constants.pair_mass
         for n in range(slots):
             row, point = candidate[n], points[n]
             for i in range(LANES):
+                radius, owner_radius = at(radii, i), at(owner_radii, i)
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 x, y, z, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
@@ -240,7 +235,7 @@ def make_place(features, kind):
                 point.spent[1, i] = -gy
                 point.spent[2, i] = -gz
             for i in range(LANES):
-                place_masses(point, i, A, B, inverse_mass)
+                place_masses(point, i, A, B, 1.0 / at(pair_mass, i))
 
     return place
 

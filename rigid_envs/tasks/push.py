@@ -38,6 +38,7 @@ class Push(Task):
     draws = 3 + 2 * TRIES
     camera = Camera(target=(-0.03, -0.04, 0.15), distance=1.28)
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
+    sizes = True
 
     def scene(self) -> Scene:
         """A cube on the ground, and a finger above it."""
@@ -51,7 +52,11 @@ class Push(Task):
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """Cube at a random place and yaw, finger at home, goal away from the cube."""
         n = len(draws)
-        position = np.full((n, 1, 3), HALF)
+        height = np.full(n, HALF)
+        if world.features.varied:
+            height *= world.parameters.size[mask, 0]
+        position = np.zeros((n, 1, 3))
+        position[:, 0, 2] = height
         position[:, 0, :2] = RANGE * (2.0 * draws[:, :2] - 1.0)
         half_yaw = np.pi / 4.0 * draws[:, 2]  # a cube looks the same after a quarter turn
         orientation = np.zeros((n, 1, 4))
@@ -59,7 +64,8 @@ class Push(Task):
         world.reset(mask)
         world.set_state(position=position, orientation=orientation, worlds=mask)
 
-        goals = np.full((n, TRIES + 1, 3), HALF)
+        goals = np.zeros((n, TRIES + 1, 3))
+        goals[:, :, 2] = height[:, None]
         goals[:, :TRIES, :2] = RANGE * (2.0 * draws[:, 3:].reshape(n, TRIES, 2) - 1.0)
         # should all of them be too near, the point opposite the origin from the far corner is not
         goals[:, TRIES, :2] = np.where(position[:, 0, :2] > 0.0, -RANGE, RANGE)

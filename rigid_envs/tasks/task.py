@@ -25,6 +25,7 @@ class Task(ABC):
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
         camera: that sees all of the task.
+        sizes: whether `start` takes worlds whose bodies have sizes of their own.
 
     What an instance needs to know beyond its class, as a number of blocks, are arguments of its
     constructor, which gym.make hands on.
@@ -37,6 +38,7 @@ class Task(ABC):
     draws: int
     reward: Reward
     camera: Camera = Camera()
+    sizes: ClassVar[bool] = False
 
     @abstractmethod
     def scene(self) -> Scene:

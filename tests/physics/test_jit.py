@@ -29,7 +29,9 @@ print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), world.po
 PUSH = """
 from physics import World
 from physics.reference import scenes
-world = World(scenes.push_like())
+world = World(scenes.push_like(), varied={varied})
+if world.features.varied:
+    world.set_parameters(mass=0.17, friction=0.3, restitution=0.4)
 world.set_state(position=(0.0, 0.0, 0.0199), drive_position=(-0.0349, 0.0, 0.021))
 world.command_drives((0.3, 0.1, 0.0))
 world.advance(0.02)
@@ -78,7 +80,7 @@ def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
     root, cache, (_, _, height) = copied
     path = root / "physics" / "stages" / "gravity.py"
     source = path.read_text()
-    line = "force[2, i] = wz"
+    line = "force[2, i] = at(wz, i)"
     assert line in source
     path.write_text(source.replace(line, f"{line} * 2.0"))
     assert run(FALL, cache, root) == pytest.approx([0.0, 1.0, 2.0 * height], rel=1e-12)
@@ -123,8 +125,10 @@ def test_only_one_file_names_the_options_of_numba():
             ), path
 
 
-def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path):
-    plain = run(PUSH, tmp_path, NUMBA_DISABLE_JIT="1")
-    compiled = run(PUSH, os.environ.get("NUMBA_CACHE_DIR", tmp_path))
+@pytest.mark.parametrize("varied", [False, True])
+def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path, varied):
+    script = PUSH.format(varied=varied)
+    plain = run(script, tmp_path, NUMBA_DISABLE_JIT="1")
+    compiled = run(script, os.environ.get("NUMBA_CACHE_DIR", tmp_path))
     assert len(plain) == len(compiled) > 20
     np.testing.assert_allclose(plain, compiled, rtol=1e-9, atol=1e-9)

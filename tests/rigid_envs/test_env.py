@@ -288,9 +288,9 @@ def test_a_bad_seed_is_refused(env, seed):
     assert_refused(env, act, (TypeError, ValueError), rf"seed must be .*got {seed!r}")
 
 
-def test_options_are_refused_as_there_are_none(env):
+def test_an_unknown_option_is_refused(env):
     act = lambda: env.reset(options={"goal": 1})  # noqa: E731
-    assert_refused(env, act, ValueError, "options must be None or empty, got {'goal': 1}")
+    assert_refused(env, act, ValueError, "options knows only \"randomize\", got {'goal': 1}")
 
 
 def test_stepping_before_the_first_reset_is_refused():

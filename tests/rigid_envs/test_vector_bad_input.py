@@ -104,7 +104,7 @@ def test_a_bad_seed_is_named_and_resets_no_world(envs, seed, match):
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"mask": 1}, r"options knows only \"reset_mask\", got \['mask'\]"),
+        ({"mask": 1}, r"options knows only \"reset_mask\" and \"randomize\", got \['mask'\]"),
         ({"reset_mask": [1, 0, 0, 0]}, r"bools of shape \(4,\).*got int64"),
         (
             {"reset_mask": np.ones(3, dtype=bool)},

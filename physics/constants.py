@@ -1,0 +1,143 @@
+"""The numbers of a model that follow from masses, materials and sizes: of any worlds at once.
+
+A scene's own model is the case of one world. Everything is elementwise over worlds and sides, so a
+world's numbers don't depend, to the last bit, on how many are worked out with them.
+"""
+
+import numpy as np
+
+from physics.layout import Layout, leverage, pair_stiffness
+from physics.parameters import Parameters
+from physics.scene import Body, Drive, Ground
+from physics.shapes import PLANE
+from physics.stages.friction import tangential_coefficients
+from physics.stages.normal_force import damping_coefficients, rest_speed
+
+Array = np.ndarray
+Columns = dict[str, Array]
+# How much faster a cube rocks on its face than it bobs, in stiffness by mass. A plate rocks twice
+# as fast again, and would outrun the step: its contacts are that much softer
+_CUBE = 9.0 / 8.0
+# of the impulse law: the damping ratio of a soft contact, and the steps of free fall whose speed
+# counts as rest
+SOFT_DAMPING, REST_STEPS = 1.0, 4.0
+
+
+def _of_solids(bodies: Array, others: list[float]) -> Array:
+    """[n, solids]: a value [n, bodies] of the bodies, beside those of the other solids."""
+    rest = np.broadcast_to(np.array(others, dtype=float), (len(bodies), len(others)))
+    return np.concatenate([bodies, rest], axis=1)
+
+
+def _inertia(layout: Layout, p: Parameters) -> Array:
+    """Principal moments [n, bodies, 3] in kg m^2."""
+    moments = np.empty((*p.mass.shape, 3))
+    for i, body in enumerate(layout.solids[: layout.bodies]):
+        assert isinstance(body, Body)
+        square = p.size[:, i] * p.size[:, i]
+        moments[:, i] = square[:, None] * body.shape.inertia(p.mass[:, i])
+    return moments
+
+
+def of_movers(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, movers, ...] of MOVER, by name: bodies, then drives."""
+    n, drives = len(p.mass), layout.solids[layout.bodies : layout.movers]
+    endless = np.full((n, len(drives), 3), np.inf)
+    inertia = np.concatenate([_inertia(layout, p), endless], axis=1)
+    # the carriage carries a drive; without a negative zero, which sums would lose
+    weight = np.zeros((n, layout.movers, 3))
+    weight[:, : layout.bodies] = p.mass[:, :, None] * layout.gravity + 0.0
+    mass = [d.mass for d in drives if isinstance(d, Drive)]
+    reach = [s.shape.reach for s in layout.solids[: layout.movers] if not isinstance(s, Ground)]
+    return {
+        "reach": _of_solids(p.size, [1.0] * len(drives)) * np.array(reach),
+        "inverse_mass": 1.0 / _of_solids(p.mass, mass),
+        "inertia": inertia,
+        "inverse_inertia": 1.0 / inertia,
+        "weight": weight,
+    }
+
+
+def of_sides(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, sides, ...] of SIDE, by name."""
+    solids, sides, fidelity = layout.solids, layout.sides, layout.fidelity
+    rest = solids[layout.bodies :]
+    a = np.array([side.owner for side in sides], dtype=int)
+    b = np.array([side.other for side in sides], dtype=int)
+
+    masses = [s.mass if isinstance(s, Drive) else np.inf for s in rest]
+    mass = _of_solids(p.mass, masses)
+    size = _of_solids(p.size, [1.0] * len(rest))
+    friction = _of_solids(p.friction, [s.material.friction for s in rest])
+    restitution = _of_solids(p.restitution, [s.material.restitution for s in rest])
+    restitution = np.maximum(restitution[:, a], restitution[:, b])
+    friction = np.sqrt(friction[:, a] * friction[:, b])
+    given = np.array([pair_stiffness(solids[i].material, solids[j].material)
+                      for i, j in zip(a, b, strict=True)])  # fmt: skip
+
+    h, omega = fidelity.substep, fidelity.contact_resolution / fidelity.substep
+    g = float(np.sqrt(np.sum(layout.gravity**2)))
+    inverse = 1.0 / mass
+    pair_mass = 1.0 / (inverse[:, a] + inverse[:, b])
+    along, across = layout.modes[:, 0], layout.modes[:, 1]
+    soft = np.minimum(1.0, _CUBE / np.maximum(along[a], along[b]))
+    stiffness = np.where(np.isnan(given), pair_mass * omega**2 * soft, given)
+    # mass that a tangential force at the surface feels, turning included
+    shear = 1.0 / (mass / across)
+    shear_mass = 1.0 / (shear[:, a] + shear[:, b])
+    levers = np.array([leverage(solid) for solid in solids])
+    shear_stiffness, shear_damping = tangential_coefficients(
+        stiffness, pair_mass, shear_mass, levers[a] + levers[b], h
+    )
+
+    least = _of_solids(_inertia(layout, p).min(axis=-1), [np.inf] * len(rest))
+    turns = (a < layout.bodies) | (b < layout.bodies)  # a tool that meets the ground never does
+    turning = np.where(turns, 1.0 / least[:, a] + 1.0 / least[:, b], 1.0)
+    twist_stiffness, twist_damping = tangential_coefficients(
+        omega**2 / turning, 1.0 / turning, 1.0 / turning, np.zeros(len(sides)), h
+    )
+
+    if fidelity.law == "impulse":
+        damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
+        slowest = np.full(stiffness.shape, REST_STEPS * g * h)
+    else:
+        damping = damping_coefficients(restitution, fidelity.damping)
+        slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
+
+    # grounds have no width that counts, and statics none that limits the skin
+    widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
+    moving = np.where(np.arange(len(solids)) < layout.movers, widths, np.inf)
+    reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
+    # of a wide face few samples lie where a narrow one touches it, so the narrow one's bear the
+    # more: half and half of equal ones
+    shared = np.array([side.shared for side in sides], dtype=bool)
+    own = np.where(shared, widths[:, a], 1.0)
+    other = np.where(shared, widths[:, b], 1.0)
+    own, other = own * own, other * other
+    sampled = np.array([side.samples.radius for side in sides])
+    rounded = np.array([side.surface.radius for side in sides])
+    cores = np.array([side.surface.parameters for side in sides]).reshape(-1, 3)
+    plane = np.array([side.surface.kind == PLANE for side in sides], dtype=bool)
+    return {
+        "core": cores * np.where(plane, 1.0, size[:, b])[:, :, None],
+        "owner_radius": sampled * size[:, a],
+        "radius": sampled * size[:, a] + rounded * size[:, b],
+        "owner_reach": reach[:, a],
+        "surface_reach": reach[:, b],
+        "owner_size": size[:, a],
+        "surface_size": size[:, b],
+        "share": np.where(shared, other / (own + other), 1.0),
+        "skin": fidelity.skin * np.minimum(moving[:, a], moving[:, b]),
+        "stiffness": stiffness,
+        "damping": damping,
+        "restitution": restitution,
+        "rest_speed": slowest,
+        "pair_mass": pair_mass,
+        "owner_inverse_mass": inverse[:, a],
+        "surface_inverse_mass": inverse[:, b],
+        "shear_stiffness": shear_stiffness,
+        "shear_damping": shear_damping,
+        "friction": friction,
+        "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
+        "twist_damping": np.where(turns, twist_damping, 0.0),
+    }

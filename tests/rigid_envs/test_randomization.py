@@ -1,0 +1,248 @@
+"""Randomised episodes: what is drawn, that seeds reproduce it, and what is refused."""
+
+import copy
+import pickle
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import rigid_envs  # noqa: F401
+from rigid_envs import scene_view
+from rigid_envs.draws import normal, uniform
+from rigid_envs.runner import Runner
+
+RANGES = {
+    "mass": (0.5, 2.0),
+    "friction": (0.2, 1.0),
+    "restitution": (0.0, 0.5),
+    "size": (0.75, 1.25),
+    "noise": (0.0, 0.2),
+}
+PUSH = "RigidEnvs/Push-v0"
+
+
+def actions(steps, count, seed=0):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, count, 3)).astype(np.float32)
+
+
+def vector(count, **arguments):
+    return gym.make_vec(PUSH, num_envs=count, **{"randomize": RANGES, **arguments})
+
+
+def played(env, steps, options=None):
+    """Observations of a rollout of a vector environment, two episodes long."""
+    seen = [env.reset(seed=5, options=options)[0]["observation"]]
+    seen += [env.step(a)[0]["observation"] for a in actions(steps, env.num_envs)]
+    return np.stack(seen)
+
+
+def test_every_episode_draws_parameters_of_its_own_within_the_ranges():
+    runner = Runner("push", 500, randomize=RANGES)
+    runner.reset(np.ones(500, dtype=bool), np.arange(500))
+    first = runner.world.parameters
+    for name, base in (("mass", 0.1), ("friction", 1.0), ("restitution", 1.0), ("size", 1.0)):
+        low, high = (base * end for end in RANGES[name])
+        values = getattr(first, name)
+        assert low <= values.min() < low + 0.05 * (high - low)
+        assert high - 0.05 * (high - low) < values.max() <= high
+        assert values.mean() == pytest.approx(0.5 * (low + high), rel=0.05)
+    runner.reset(np.arange(500) < 250)
+    assert np.all(runner.world.parameters.mass[:250] != first.mass[:250])
+    np.testing.assert_array_equal(runner.world.parameters.mass[250:], first.mass[250:])
+
+
+def test_a_world_of_many_is_the_single_environment_bit_for_bit():
+    count, steps = 9, 60
+    many = played(vector(count, observe_parameters=True, max_episode_steps=25), steps)
+    for i in (0, 5, 8):
+        one = gym.make(PUSH, randomize=RANGES, observe_parameters=True).unwrapped
+        observation, _ = one.reset(seed=5 + i)
+        assert observation["observation"].tobytes() == many[0, i].tobytes()
+        taken, ended = 0, False
+        for step, action in enumerate(actions(steps, count)[:, i]):
+            if ended:  # the vector environment's step is then the reset
+                observation, _ = one.reset()
+                taken = 0
+            else:
+                observation, *_ = one.step(action)
+                taken += 1
+            ended = taken == 25
+            assert observation["observation"].tobytes() == many[step + 1, i].tobytes()
+
+
+def test_a_cube_of_another_size_lies_on_the_ground():
+    runner = Runner("push", 100, randomize={"size": (0.6, 1.5)})
+    runner.reset(np.ones(100, dtype=bool), np.arange(100))
+    half = 0.02 * runner.world.parameters.size[:, 0]
+    np.testing.assert_allclose(runner.world.position[:, 0, 2], half, rtol=1e-14)
+    np.testing.assert_allclose(runner.goals[:, 2], half, rtol=1e-6)
+    runner.world.advance(0.5)
+    np.testing.assert_allclose(runner.world.position[:, 0, 2], half, atol=5e-4)
+
+
+def test_a_picture_shows_the_size_that_was_drawn():
+    runner = Runner("push", 2, randomize={"size": (1.5, 1.5)})
+    runner.reset(np.ones(2, dtype=bool), np.arange(2))
+    cube = scene_view.items(runner, 1)[0]
+    np.testing.assert_allclose(cube.shape.half_extents, 0.03)
+
+
+def test_observed_parameters_are_those_drawn_and_lie_in_the_space():
+    env = vector(50, observe_parameters=True)
+    observation, _ = env.reset(seed=0)
+    own = env.unwrapped._runner.world.parameters
+    seen = observation["observation"][:, -5:]
+    for column, values in enumerate((own.mass, own.friction, own.restitution, own.size)):
+        np.testing.assert_array_equal(seen[:, column], values[:, 0].astype(np.float32))
+    assert env.observation_space.contains(observation)
+    assert env.single_observation_space["observation"].shape == (27,)
+    assert vector(1).single_observation_space["observation"].shape == (22,)
+    names = [name for name, *_ in env.unwrapped._runner.bounds[-5:]]
+    assert names == [*(f"body 0 {n}" for n in own._fields), "control noise"]
+
+
+def test_without_randomisation_nothing_is_added_and_no_bit_changes():
+    plain, none = (gym.make_vec(PUSH, num_envs=4, **extra) for extra in ({}, {"randomize": {}}))
+    assert played(plain, 20).tobytes() == played(none, 20).tobytes()
+    assert not none.unwrapped._runner.world.features.varied
+    assert not vector(2, randomize={"noise": 0.1}).unwrapped._runner.world.features.varied
+    alike = {"mass": (1.0, 1.0), "friction": 0.5, "restitution": 0.1, "size": 1.0}
+    assert played(vector(4, randomize=alike), 20).tobytes() == played(plain, 20).tobytes()
+
+
+# --- noise --------------------------------------------------------------------------------------
+
+
+def test_noise_is_gaussian_and_each_step_has_its_own():
+    seeds, episodes = np.arange(20000), np.zeros(20000, dtype=int)
+    values = normal(seeds, episodes, 3, 7)
+    assert values.mean() == pytest.approx(0.0, abs=0.02)
+    assert values.std() == pytest.approx(1.0, abs=0.02)
+    assert np.mean(np.abs(values) < 1.0) == pytest.approx(0.6827, abs=0.01)
+    other = normal(seeds, episodes, 3, 8)
+    assert abs(np.corrcoef(values[:, 0], other[:, 0])[0, 1]) < 0.02
+    assert values[17:18].tobytes() == normal(seeds[17:18], episodes[:1], 3, 7).tobytes()
+
+
+def test_streams_leave_the_draws_of_starts_as_they_are():
+    seeds, episodes = np.arange(5), np.arange(5)
+    plain = uniform(seeds, episodes, 4)
+    assert plain.tobytes() == uniform(seeds, episodes, 4, 0).tobytes()
+    streams = np.array([0, 1, 2, 3, 4])
+    mixed = uniform(seeds, episodes, 4, streams)
+    for i in range(5):
+        alone = uniform(seeds[i : i + 1], episodes[i : i + 1], 4, i)
+        assert mixed[i].tobytes() == alone[0].tobytes()
+
+
+def test_noise_moves_what_is_told_to_rest_and_actions_stay_within_their_limits():
+    still, shaken = vector(3, randomize={"noise": 0.0}), vector(3, randomize={"noise": 0.5})
+    for env, moves in ((still, False), (shaken, True)):
+        before = env.reset(seed=0)[0]["observation"][:, :3]
+        after = env.step(np.zeros((3, 3), dtype=np.float32))[0]["observation"][:, :3]
+        assert np.all(np.abs(after - before).max(axis=1) > 1e-3) == moves
+    runner = Runner("push", 3, randomize={"noise": 5.0})
+    runner.reset(np.ones(3, dtype=bool), np.arange(3))
+    steps, seeds = np.zeros(3, dtype=int), np.arange(3)
+    disturbed = runner.randomization.disturb(np.ones((3, 3)), seeds, steps, steps)
+    assert np.abs(disturbed).max() <= 1.0
+
+
+# --- options, states ----------------------------------------------------------------------------
+
+
+def test_options_give_the_worlds_that_they_reset_other_ranges_until_taken_back():
+    env = gym.make_vec(PUSH, num_envs=4, autoreset_mode="Disabled")
+    runner = env.unwrapped._runner
+    env.reset(seed=0)
+    mask = np.array([True, False, True, False])
+    env.reset(options={"reset_mask": mask, "randomize": {"mass": (2.0, 3.0)}})
+    mass = runner.world.parameters.mass[:, 0]
+    assert np.all((mass[mask] >= 0.2) & (mass[mask] <= 0.3))
+    assert np.all(mass[~mask] == 0.1)
+    env.reset()
+    assert np.all(runner.world.parameters.mass[mask, 0] != mass[mask])
+    env.reset(options={"randomize": None})
+    assert np.all(runner.world.parameters.mass == 0.1)
+
+
+def test_worlds_that_are_not_reset_carry_on_to_the_last_bit_under_options():
+    plain, other = (gym.make_vec(PUSH, num_envs=2, autoreset_mode="Disabled") for _ in range(2))
+    for env in (plain, other):
+        env.reset(seed=0)
+        for action in actions(5, 2):
+            env.step(action)
+    mask = np.array([True, False])
+    plain.reset(options={"reset_mask": mask})
+    other.reset(options={"reset_mask": mask, "randomize": {"friction": (0.1, 0.2)}})
+    for action in actions(10, 2, seed=1):
+        a, b = (env.step(action)[0]["observation"][1] for env in (plain, other))
+        assert a.tobytes() == b.tobytes()
+
+
+@pytest.mark.parametrize("way", ["state", "pickle", "deepcopy"])
+def test_what_is_carried_over_continues_to_the_last_bit(way):
+    env = vector(3, observe_parameters=True)
+    played(env, 10)
+    if way == "state":
+        other = vector(3, observe_parameters=True)
+        other.unwrapped.set_state(pickle.loads(pickle.dumps(env.unwrapped.get_state())))
+    else:
+        other = pickle.loads(pickle.dumps(env)) if way == "pickle" else copy.deepcopy(env)
+    for action in actions(60, 3, seed=2):
+        a, b = (each.step(action)[0]["observation"] for each in (env, other))
+        assert a.tobytes() == b.tobytes()
+
+
+def test_gymnasiums_checker_has_nothing_to_say(recwarn):
+    env = gym.make(PUSH, randomize=RANGES, observe_parameters=True)
+    check_env(env.unwrapped, skip_render_check=True)
+    assert not [w for w in recwarn if issubclass(w.category, UserWarning)]
+
+
+# --- what is refused ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ranges", "error", "message"),
+    [
+        ({"masss": (1, 2)}, ValueError, "randomize must be one of ['mass', 'friction', "),
+        ({"mass": (0.0, 1.0)}, ValueError, "randomize['mass'] must be above 0, got (0.0, 1.0)"),
+        ({"mass": (2.0, 1.0)}, ValueError, "randomize['mass'] must be (low, high) with low"),
+        ({"mass": (1.0, 2.0, 3.0)}, ValueError, "randomize['mass'] must be (low, high) or a"),
+        ({"mass": "heavy"}, TypeError, "randomize['mass'] must be a number, got 'heavy'"),
+        ({"friction": (-0.1, 1)}, ValueError, "randomize['friction'] must be at least 0"),
+        ({"restitution": (0, 1.5)}, ValueError, "at least 0 and at most 1, got (0, 1.5)"),
+        ({"noise": (0, np.nan)}, ValueError, "randomize['noise'] high must be finite, got nan"),
+        ({"size": (1e-4, 1)}, ValueError, "would sink"),
+        ([("mass", (1, 2))], TypeError, "randomize must be a dict"),
+    ],
+)
+def test_bad_ranges_are_named_at_construction_and_at_reset(ranges, error, message):
+    with pytest.raises(error, match=re.escape(message)):
+        Runner("push", 1, randomize=ranges)
+    env = gym.make(PUSH).unwrapped
+    env.reset(seed=0)
+    before = env.get_state()
+    with pytest.raises(error, match=re.escape(message)):
+        env.reset(seed=1, options={"randomize": ranges})
+    after = env.get_state()
+    for name in ("seeds", "episodes", "elapsed", "goals", "drawn", "ranges"):
+        np.testing.assert_array_equal(before[name], after[name])
+
+
+def test_a_task_laid_out_for_one_size_takes_no_other():
+    with pytest.raises(ValueError, match=r"randomize\['size'\]: this task is laid out for bodies"):
+        Runner("stack", 1, randomize={"size": (0.9, 1.1)})
+
+
+def test_observed_parameters_need_ranges_and_options_stay_within_them():
+    with pytest.raises(ValueError, match="observe_parameters needs randomize"):
+        Runner("push", 1, observe_parameters=True)
+    env = gym.make(PUSH, randomize={"mass": (0.5, 2.0)}, observe_parameters=True).unwrapped
+    env.reset(seed=0, options={"randomize": {"mass": (1.0, 1.5)}})
+    with pytest.raises(ValueError, match=r"randomize\['mass'\] in options must stay within"):
+        env.reset(options={"randomize": {"mass": (1.0, 2.5)}})
