@@ -55,7 +55,14 @@ def test_the_checker_has_nothing_to_say(check, env_id, reward_type, fidelity, re
     env.close()
 
 
-@pytest.mark.parametrize("option", [{"terminate_on_success": True}, {"show_forces": True}])
+@pytest.mark.parametrize(
+    "option",
+    [
+        {"terminate_on_success": True},
+        {"show_forces": True},
+        {"target_yaw": True, "obstacles": 2, "render_mode": "rgb_array"},
+    ],
+)
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checker_has_nothing_to_say_of_other_options(check, option):
     with warnings.catch_warnings():
