@@ -1,11 +1,27 @@
 """Push: a finger on a carriage pushes a cube over the ground to a goal."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from physics import Body, Box, Drive, Ground, Material, Readout, Scene, Sphere, World
+from physics import (
+    Body,
+    Box,
+    Capsule,
+    Drive,
+    Ground,
+    Material,
+    Readout,
+    Scene,
+    Sphere,
+    Static,
+    World,
+)
+from physics.validation import instance, integer
 from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
+from rigid_envs.view import Goal, Sign
 
 Array = np.ndarray
 
@@ -19,10 +35,22 @@ RANGE = 0.15  # m, of starts and goals from the origin, each axis
 THRESHOLD = 0.05  # m
 # goals drawn for an episode; the first that isn't solved at the start is taken
 TRIES = 6
+# m, length of a heading; at the threshold's length, 15 degrees of yaw are just within it
+ARM = THRESHOLD
+# m, where posts stand, in the order in which they are set up
+POSTS = 0.075 * np.array([[1.0, 1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0]])
+POST_RADIUS, POST_HEIGHT = 0.015, 0.05  # m
+# m, least distance of starts and goals from a post: at any yaw, a cube there doesn't touch it
+CLEAR = 0.05
 
 
 class Push(Task):
-    """Cube and goal lie anywhere within 15 cm of the origin; solved within 5 cm of the goal."""
+    """Cube and goal lie anywhere within 15 cm of the origin; solved within 5 cm of the goal.
+
+    Args:
+        target_yaw: whether the goal asks for a yaw too, which counts as solved within 15 degrees.
+        obstacles: number of posts that stand in the way, 0 to 4.
+    """
 
     actions = ("finger x", "finger y", "finger z")
     bounds = (
@@ -40,25 +68,53 @@ class Push(Task):
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
     sizes = True
 
+    def __init__(self, target_yaw: bool = False, obstacles: int = 0) -> None:
+        """Adds what the options ask for to the goal and to the draws of a start."""
+        self.target_yaw = bool(instance("target_yaw", target_yaw, bool))
+        self.obstacles = integer("obstacles", obstacles, low=0)
+        if self.obstacles > len(POSTS):
+            raise ValueError(f"obstacles must be at most {len(POSTS)}, got {obstacles!r}")
+        if self.target_yaw:
+            heading = tuple((f"cube heading {a}", "m", -2.0 * ARM, 2.0 * ARM) for a in "xy")
+            self.goal_bounds = Push.goal_bounds + heading
+            self.draws += 1
+        if self.obstacles:
+            self.draws += 2 * TRIES
+
     def scene(self) -> Scene:
-        """A cube on the ground, and a finger above it."""
+        """A cube on the ground, a finger above it, and posts."""
         material = Material(friction=0.5, restitution=0.1)
+        post = Capsule(POST_RADIUS, 0.5 * POST_HEIGHT - POST_RADIUS)
+        posts = [
+            Static(post, (x, y, 0.5 * POST_HEIGHT), material=material)
+            for x, y in POSTS[: self.obstacles]
+        ]
         return Scene(
             bodies=[Body(Box((HALF,) * 3), mass=MASS, position=(0, 0, HALF), material=material)],
-            statics=[Ground(material=material)],
+            statics=[Ground(material=material), *posts],
             drives=[Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME)],
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
-        """Cube at a random place and yaw, finger at home, goal away from the cube."""
+        """Cube at a random place and yaw, finger at home, goal away from the cube.
+
+        Neither lies near a post.
+        """
         n = len(draws)
+        drawn, more = draws[:, : Push.draws], draws[:, Push.draws :]
         height = np.full(n, HALF)
         if world.features.varied:
             height *= world.parameters.size[mask, 0]
         position = np.zeros((n, 1, 3))
         position[:, 0, 2] = height
-        position[:, 0, :2] = RANGE * (2.0 * draws[:, :2] - 1.0)
-        half_yaw = np.pi / 4.0 * draws[:, 2]  # a cube looks the same after a quarter turn
+        position[:, 0, :2] = RANGE * (2.0 * drawn[:, :2] - 1.0)
+        if self.obstacles:
+            places = np.zeros((n, TRIES + 2, 2))  # the last, the origin, is clear of all posts
+            places[:, 0] = position[:, 0, :2]
+            places[:, 1:-1] = RANGE * (2.0 * more[:, : 2 * TRIES].reshape(n, TRIES, 2) - 1.0)
+            clear = self._clear(places, height)
+            position[:, 0, :2] = places[np.arange(n), np.argmax(clear, axis=1)]
+        half_yaw = np.pi / 4.0 * drawn[:, 2]  # a cube looks the same after a quarter turn
         orientation = np.zeros((n, 1, 4))
         orientation[:, 0, 2], orientation[:, 0, 3] = np.sin(half_yaw), np.cos(half_yaw)
         world.reset(mask)
@@ -66,11 +122,25 @@ class Push(Task):
 
         goals = np.zeros((n, TRIES + 1, 3))
         goals[:, :, 2] = height[:, None]
-        goals[:, :TRIES, :2] = RANGE * (2.0 * draws[:, 3:].reshape(n, TRIES, 2) - 1.0)
+        goals[:, :TRIES, :2] = RANGE * (2.0 * drawn[:, 3:].reshape(n, TRIES, 2) - 1.0)
         # should all of them be too near, the point opposite the origin from the far corner is not
         goals[:, TRIES, :2] = np.where(position[:, 0, :2] > 0.0, -RANGE, RANGE)
         away = distance(goals, position) > THRESHOLD + 0.01
-        return goals[np.arange(n), np.argmax(away, axis=1)]
+        away &= self._clear(goals, height)
+        goal = goals[np.arange(n), np.argmax(away, axis=1)]
+        if not self.target_yaw:
+            return goal
+        fourfold = 2.0 * np.pi * more[:, -1]  # of a yaw of up to a quarter turn
+        heading = ARM * np.stack([np.cos(fourfold), np.sin(fourfold)], axis=1)
+        return np.concatenate([goal, heading], axis=1)
+
+    def _clear(self, places: Array, height: Array) -> Array:
+        """Which places [n, tries, 2 or 3] of cubes of half a width [n] aren't near any post."""
+        clear = np.ones(places.shape[:2], dtype=bool)
+        least = POST_RADIUS + (CLEAR - POST_RADIUS) / HALF * height[:, None]
+        for post in POSTS[: self.obstacles]:
+            clear &= np.sum((places[:, :, :2] - post) ** 2, axis=2) > least**2
+        return clear
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the finger by up to 5 cm along each axis, within its workspace."""
@@ -86,14 +156,49 @@ class Push(Task):
         np.subtract(rows[:, 0, :3], rows[:, 1, :3], out=out[:, 19:22], casting="same_kind")
 
     def achieved(self, world: World, now: Readout) -> Array:
-        """Where the cube is."""
-        return now.position[:, 0]
+        """Where the cube is, and its heading if the goal asks for a yaw."""
+        if not self.target_yaw:
+            return now.position[:, 0]
+        return np.concatenate([now.position[:, 0], heading(now.rows[:, 0, 3:7])], axis=1)
 
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
         """`reach`: m, minus the finger's way to the cube's side that faces away from the goal."""
-        away = achieved - desired
+        cube = achieved[:, :3]
+        away = cube - desired[:, :3]
+        if self.target_yaw:  # the goals' distance may be one of headings
+            apart = np.sqrt(np.sum(away**2, axis=1))
         ratio = (1.6 * HALF + FINGER) / np.maximum(apart, 1e-6)
-        behind = achieved + away * ratio[:, None]
+        behind = cube + away * ratio[:, None]
         return {"reach": -distance(now.position[:, 1], behind)}
+
+    def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
+        """The goal's place, and dots under the corners of a cube at the yaw that it asks for."""
+        shown: list[Sign] = [Goal(goal[:3], THRESHOLD)]
+        if self.target_yaw:
+            corners = 0.25 * np.arctan2(goal[4], goal[3]) + np.pi / 4.0 * np.array([1, 3, 5, 7])
+            dots = np.stack([np.cos(corners), np.sin(corners), np.zeros(4)], axis=1)
+            foot = goal[:3] * (1.0, 1.0, 0.0)
+            shown += [Goal(foot + np.sqrt(2.0) * HALF * dot, 0.15 * HALF) for dot in dots]
+        return shown
+
+
+def heading(orientation: Array) -> Array:
+    """Heading [n, 2] m of cubes by their quaternions [n, 4]; the same for all turns onto itself.
+
+    With a cube's axes a, b and c, each seen from above as a complex number x + iy, it is
+    ARM (a^4 + b^4 + c^4) / 2. A cube that lies flat on any face has one upright axis, which gives
+    0, and two at its yaw, each of which gives exp(4i yaw): ARM (cos 4 yaw, sin 4 yaw). The heading
+    of a tilted cube is shorter, down to 0 on a corner, where no yaw is to be seen.
+    """
+    x, y, z, w = np.asarray(orientation, dtype=float).T
+    axes = np.array(
+        [
+            1.0 - 2.0 * (y * y + z * z) + 2.0j * (x * y + z * w),
+            2.0 * (x * y - z * w) + 1.0j * (1.0 - 2.0 * (x * x + z * z)),
+            2.0 * (x * z + y * w) + 2.0j * (y * z - x * w),
+        ]
+    )
+    total = 0.5 * ARM * np.sum(axes**4, axis=0)
+    return np.stack([total.real, total.imag], axis=1)

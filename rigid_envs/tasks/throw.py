@@ -39,7 +39,8 @@ class Throw(Task):
     )
     goal_bounds = tuple((f"ball {a}", "m", -5.0, 5.0) for a in "xyz")
     draws = 2
-    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0})
+    # time makes it cost to hold the ball out at a near target, where success ends an episode
+    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0, "time": -1.0})
 
     def scene(self) -> Scene:
         """A ball between the pads of a hand above the ground."""

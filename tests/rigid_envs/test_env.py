@@ -28,6 +28,8 @@ from tests.rigid_envs.rollout import (
 )
 
 ACTIONS = random_actions(EPISODE, 1)[:, 0]
+# of other tasks too, which have hands
+HAND_ACTIONS = random_actions(EPISODE, 1, size=4)[:, 0]
 ZERO = np.zeros(3, dtype=np.float32)
 
 
@@ -55,7 +57,14 @@ def test_the_checker_has_nothing_to_say(check, env_id, reward_type, fidelity, re
     env.close()
 
 
-@pytest.mark.parametrize("option", [{"terminate_on_success": True}, {"show_forces": True}])
+@pytest.mark.parametrize(
+    "option",
+    [
+        {"terminate_on_success": True},
+        {"show_forces": True},
+        {"target_yaw": True, "obstacles": 2, "render_mode": "rgb_array"},
+    ],
+)
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checker_has_nothing_to_say_of_other_options(check, option):
     with warnings.catch_warnings():
@@ -149,6 +158,15 @@ def rollout(env, actions=ACTIONS):
     return list(steps_of(env, actions))
 
 
+def begun(env_id, env=None):
+    """An environment in the middle of an episode, and actions for the rest of it."""
+    env = env or make(env_id)
+    actions = ACTIONS if env_id == PUSH else HAND_ACTIONS
+    env.reset(seed=0)
+    rollout(env, actions[:20])
+    return env, actions[20:]
+
+
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_seed_gives_the_same_episodes_whatever_came_before(fidelity):
     fresh, used = make(fidelity=fidelity), make(fidelity=fidelity)
@@ -171,34 +189,35 @@ def test_without_a_seed_two_environments_differ():
     assert not np.array_equal(first["desired_goal"], second["desired_goal"])
 
 
-def test_saving_and_going_back_repeats_to_the_last_bit(env):
-    rollout(env, ACTIONS[:20])
+@pytest.mark.parametrize("env_id", IDS)
+def test_saving_and_going_back_repeats_to_the_last_bit(env_id):
+    env, actions = begun(env_id)
     saved = env.get_state()
-    expected = [rollout(env, ACTIONS[20:]), env.reset(), rollout(env)]
+    expected = [rollout(env, actions), env.reset(), rollout(env, actions)]
     env.set_state(saved)
-    assert_same([rollout(env, ACTIONS[20:]), env.reset(), rollout(env)], expected)
+    assert_same([rollout(env, actions), env.reset(), rollout(env, actions)], expected)
 
 
-def test_a_saved_state_outlives_later_steps_and_moves_to_another_environment(env):
-    rollout(env, ACTIONS[:20])
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_saved_state_outlives_later_steps_and_moves_to_another_environment(env_id):
+    env, actions = begun(env_id)
     saved = pickle.loads(pickle.dumps(env.get_state()))
-    expected = rollout(env, ACTIONS[20:])
-    other = make()
+    expected = [rollout(env, actions), env.reset(), rollout(env, actions)]
+    other = make(env_id)
     other.set_state(saved)
-    assert_same(rollout(other, ACTIONS[20:]), expected)
+    assert_same([rollout(other, actions), other.reset(), rollout(other, actions)], expected)
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 @pytest.mark.parametrize("render_mode", [None, "rgb_array"])
-def test_a_copy_goes_on_by_itself_to_the_last_bit(clone, render_mode):
-    env = gym.make(PUSH, render_mode=render_mode)
-    env.reset(seed=0)
-    rollout(env, ACTIONS[:20])
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_copy_goes_on_by_itself_to_the_last_bit(env_id, clone, render_mode):
+    env, actions = begun(env_id, gym.make(env_id, render_mode=render_mode))
     if render_mode:
         env.render()
     twin = clone(env)
-    expected = rollout(env, ACTIONS[20:])
-    assert_same(rollout(twin, ACTIONS[20:]), expected)
+    expected = rollout(env, actions)
+    assert_same(rollout(twin, actions), expected)
     if render_mode:
         assert_same(twin.render(), env.render())
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigid_envs.tasks import push
+from rigid_envs.tasks import push, throw
+from rigid_envs.tasks.stack import HALF, THRESHOLD, Stack
 from rigid_envs.wrappers import Stage, goal_potential
 from rigid_envs.wrappers.vector import (
     ActionPenalty,
@@ -17,7 +18,7 @@ from rigid_envs.wrappers.vector import (
     SuccessBonus,
     TimePenalty,
 )
-from tests.rigid_envs.rollout import PUSH, make_vec
+from tests.rigid_envs.rollout import PUSH, STACK, THROW, make_vec
 from training.scripted import CONTROLLERS
 
 Array = np.ndarray
@@ -25,6 +26,7 @@ Array = np.ndarray
 Policy = Callable[[dict[str, Array], int], Array]
 
 WORLDS = 64
+OPEN, CLOSE = 1.0, -1.0  # the grip
 SEED = 500
 GAMMAS = (1.0, 0.98)
 
@@ -38,21 +40,27 @@ class Case:
         stages: of its staged reward.
         steps: of an episode.
         solved: least share of worlds that the controller has to solve.
+        worlds: number of them.
     """
 
     idlers: dict[str, Policy]
     stages: list[Stage]
     steps: int
     solved: float
+    worlds: int = WORLDS
+
+
+def always(*action: float) -> Policy:
+    """The same action whatever is seen."""
+    return lambda observation, step: np.tile(action, (len(observation["observation"]), 1))
+
+
+# --- Push: its cube -----------------------------------------------------------------------------
 
 
 def toward(observation: dict[str, Array], place: Array) -> Array:
     """Actions of Push that bring the finger to a place [n, 3]."""
     return np.clip((place - observation["observation"][:, :3]) / push.STRIDE, -1.0, 1.0)
-
-
-def nothing(observation: dict[str, Array], step: int) -> Array:
-    return np.zeros((len(observation["observation"]), 3))
 
 
 def hover_above(observation: dict[str, Array], step: int) -> Array:
@@ -90,10 +98,83 @@ def _cube_and_away(observation: dict[str, Array]) -> tuple[Array, Array]:
     return cube, away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
+# --- Stack: its first cube and its last ---------------------------------------------------------
+
+
+def lead(
+    task: type[Stack] | type[throw.Throw], observation: dict[str, Array], place: Array, grip: Any
+) -> Array:
+    """Actions that bring a hand to a place [n, 3], with a grip [n] or of all."""
+    reference = observation["observation"][:, 8:11].astype(float)
+    strides = np.clip((place - reference) / task.hand.stride, -1.0, 1.0)
+    return np.concatenate([strides, np.broadcast_to(grip, (len(place), 1))], axis=1)
+
+
+def hover_above_the_first(observation: dict[str, Array], step: int) -> Array:
+    place = observation["achieved_goal"][:, :3] + np.array([0.0, 0.0, 0.05])
+    return lead(Stack, observation, place, OPEN)
+
+
+def grip_and_shake(observation: dict[str, Array], step: int) -> Array:
+    """Once the first cube is in the fingers, it goes to and fro."""
+    actions = CONTROLLERS[STACK](observation)
+    apart = np.abs(observation["achieved_goal"][:, :3] - observation["observation"][:, :3])
+    gripped = (apart.max(axis=1) < 0.75 * HALF) & (
+        observation["observation"][:, 6] < 2.0 * HALF + 0.003
+    )
+    return np.where(gripped[:, None], [0.5 if step // 4 % 2 else -0.5, 0.0, 0.0, CLOSE], actions)
+
+
+def _missing(observation: dict[str, Array], cube: int) -> Array:
+    """[n] m, of a cube from its place."""
+    part = slice(3 * cube, 3 * cube + 3)
+    way = observation["achieved_goal"][:, part] - observation["desired_goal"][:, part]
+    return np.linalg.norm(way, axis=1)
+
+
+def hold_in_place(cube: int) -> Policy:
+    """Does all of it until a cube is in its place, where it isn't let go."""
+
+    def policy(observation: dict[str, Array], step: int) -> Array:
+        actions = CONTROLLERS[STACK](observation)
+        there = _missing(observation, cube) < THRESHOLD
+        return np.where(there[:, None], [0.0, 0.0, 0.0, CLOSE], actions)
+
+    return policy
+
+
+def leave_the_last(observation: dict[str, Array], step: int) -> Array:
+    """Does all of it but the last cube."""
+    actions = CONTROLLERS[STACK](observation)
+    released = observation["observation"][:, 6] > 2.0 * HALF + 0.014
+    done = (_missing(observation, 0) < THRESHOLD) & released
+    return np.where(done[:, None], [0.0, 0.0, 0.0, OPEN], actions)
+
+
+# --- Throw: its ball ----------------------------------------------------------------------------
+
+
+def shake_the_ball(observation: dict[str, Array], step: int) -> Array:
+    """To and fro along the way to the target, so that the ball would fly far at times."""
+    return always(1.0 if step // 3 % 2 else -1.0, 0.0, 0.0, CLOSE)(observation, step)
+
+
+def reach_out(observation: dict[str, Array], step: int) -> Array:
+    """Holds the ball as near to the target as the hand can."""
+    return lead(throw.Throw, observation, observation["desired_goal"], CLOSE)
+
+
+def swing_and_hold_on(observation: dict[str, Array], step: int) -> Array:
+    """Does all of it but to let go."""
+    actions = CONTROLLERS[THROW](observation)
+    actions[:, 3] = CLOSE
+    return actions
+
+
 CASES = {
     PUSH: Case(
         {
-            "nothing": nothing,
+            "nothing": always(0.0, 0.0, 0.0),
             "hover above": hover_above,
             "wait behind": wait_behind,
             "shake": shake,
@@ -107,19 +188,53 @@ CASES = {
         50,
         0.95,
     ),
+    STACK: Case(
+        {
+            "nothing": always(0.0, 0.0, 0.0, 0.0),
+            "hover above the first": hover_above_the_first,
+            "grip and shake": grip_and_shake,
+            "hold the first in its place": hold_in_place(0),
+            "hold the last in its place": hold_in_place(1),
+            "leave the last": leave_the_last,
+        },
+        [
+            Stage("stage", start=0.0, done=0.79, weight=2.0),
+            Stage("success", start=0.0, done=1.0, weight=2.0),
+        ],
+        100,
+        0.95,
+        worlds=24,
+    ),
+    THROW: Case(
+        {
+            "nothing": always(0.0, 0.0, 0.0, 0.0),
+            "hold": always(0.0, 0.0, 0.0, CLOSE),
+            "drop": always(0.0, 0.0, 0.0, OPEN),
+            "shake": shake_the_ball,
+            "reach out": reach_out,
+            "swing and hold on": swing_and_hold_on,
+        },
+        [
+            Stage("aim", start=-1.5, done=-throw.THRESHOLD),
+            Stage("success", start=0.0, done=1.0, weight=2.0),
+        ],
+        50,
+        0.95,
+        worlds=400,  # few targets are so near that reaching out for them comes close to a hit
+    ),
 }
 
 
 def dense(case: Case, env_id: str, **kwargs: Any) -> Any:
-    return make_vec(WORLDS, env_id, reward_type="dense", **kwargs)
+    return make_vec(case.worlds, env_id, reward_type="dense", **kwargs)
 
 
 def staged(case: Case, env_id: str, **kwargs: Any) -> Any:
-    return StagedReward(make_vec(WORLDS, env_id, **kwargs), case.stages)
+    return StagedReward(make_vec(case.worlds, env_id, **kwargs), case.stages)
 
 
 def shaped(case: Case, env_id: str, **kwargs: Any) -> Any:
-    return PotentialShaping(make_vec(WORLDS, env_id, **kwargs), goal_potential, 0.98)
+    return PotentialShaping(make_vec(case.worlds, env_id, **kwargs), goal_potential, 0.98)
 
 
 def all_at_once(case: Case, env_id: str, **kwargs: Any) -> Any:
@@ -162,7 +277,7 @@ def test_solving_earns_more_than_idling_in_every_world(env_id, build, terminate)
 @pytest.mark.parametrize("env_id", CASES)
 def test_idlers_do_not_solve_the_task(env_id):
     case = CASES[env_id]
-    envs = make_vec(WORLDS, env_id)
+    envs = make_vec(case.worlds, env_id)
     for name, policy in case.idlers.items():
         assert returns(envs, policy, case.steps)[1].mean() < 0.1, name
 
@@ -178,3 +293,39 @@ def test_the_shaken_cube_goes_to_and_fro():
     there = np.linalg.norm(observation["achieved_goal"] - start, axis=1)
     assert np.median(path) > 0.1
     assert np.median(path / there) > 1.5
+
+
+def last(env_id: str, idler: str) -> tuple[dict[str, Array], dict[str, Array], Array]:
+    """Observation and info at the end of an idler's episodes, and the places [step, world, 3]."""
+    case = CASES[env_id]
+    envs = make_vec(WORLDS, env_id)
+    observation, info = envs.reset(seed=SEED)
+    places = [observation["achieved_goal"][:, :3]]
+    for step in range(case.steps):
+        observation, _, _, _, info = envs.step(case.idlers[idler](observation, step))
+        places.append(observation["achieved_goal"][:, :3])
+    return observation, info, np.array(places)
+
+
+@pytest.mark.parametrize(
+    ("idler", "placed"), [("leave the last", 1.0), ("hold the last in its place", 2.0)]
+)
+def test_a_tower_is_built_but_for_its_last_cube_or_for_letting_go(idler, placed):
+    info = last(STACK, idler)[1]
+    assert not info["is_success"].any()
+    assert (info["placed"] == placed).mean() > 0.9
+
+
+def test_the_gripped_cube_is_held_and_goes_to_and_fro():
+    _, info, places = last(STACK, "grip and shake")
+    assert info["grasp"].mean() > 0.9
+    path = np.abs(np.diff(places[-40:, :, 0], axis=0)).sum(axis=0)
+    assert np.median(path) > 4.0 * np.median(np.ptp(places[-40:, :, 0], axis=0))
+
+
+def test_the_ball_that_is_shaken_or_held_out_does_not_land():
+    shaken, held_out = (last(THROW, idler) for idler in ("shake", "reach out"))
+    for _, info, _ in (shaken, held_out):
+        assert not info["landed"].any()
+    assert np.median(np.abs(np.diff(shaken[2][:, :, 0], axis=0)).sum(axis=0)) > 1.0
+    assert held_out[2][-1, :, 0].min() > 0.9 * throw.Throw.hand.high[0]

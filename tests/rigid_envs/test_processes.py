@@ -9,12 +9,30 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
-from tests.rigid_envs.rollout import PUSH, assert_same, make, make_vec, random_actions, steps_of
+from tests.rigid_envs.rollout import (
+    EPISODE,
+    IDS,
+    STACK,
+    assert_same,
+    make,
+    make_vec,
+    random_actions,
+    steps_of,
+)
 
 WORKERS = 2
-ACTIONS = random_actions(55, WORKERS)
-# imports the package in the worker, where nothing is registered yet
-MAKE = functools.partial(gym.make, f"rigid_envs:{PUSH}")
+STEPS = {env_id: 2 * EPISODE if env_id == STACK else EPISODE for env_id in IDS}
+
+
+def makers(env_id):
+    """They import the package in the worker, where nothing is registered yet."""
+    return [functools.partial(gym.make, f"rigid_envs:{env_id}")] * WORKERS
+
+
+def actions_of(env_id):
+    """Of an episode and a little more."""
+    size = make(env_id).action_space.shape[0]
+    return random_actions(STEPS[env_id] + 5, WORKERS, size=size)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -27,15 +45,16 @@ def threads_have_run():
 
 
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+@pytest.mark.parametrize("env_id", IDS)
 @pytest.mark.parametrize(
     "context", [c for c in ("fork", "spawn") if c in multiprocessing.get_all_start_methods()]
 )
-def test_async_vector_env_says_what_the_native_one_says(context):
-    native = make_vec(WORKERS)
-    envs = AsyncVectorEnv([MAKE] * WORKERS, context=context)
+def test_async_vector_env_says_what_the_native_one_says(context, env_id):
+    native = make_vec(WORKERS, env_id)
+    envs = AsyncVectorEnv(makers(env_id), context=context)
     try:
         assert_same(envs.reset(seed=7), native.reset(seed=7))
-        for actions in ACTIONS:
+        for actions in actions_of(env_id):
             assert_same(envs.step(actions), native.step(actions))
     finally:
         envs.close()
@@ -65,14 +84,16 @@ def test_many_worlds_run_on_threads_in_a_forked_process(threads_have_run):
         process.join()
 
 
-def test_subproc_vec_env_says_what_the_single_one_says():
-    envs = SubprocVecEnv([MAKE] * WORKERS)
+@pytest.mark.parametrize("env_id", IDS)
+def test_subproc_vec_env_says_what_the_single_one_says(env_id):
+    *actions_before, last = actions_of(env_id)[: STEPS[env_id]]
+    envs = SubprocVecEnv(makers(env_id))
     try:
         envs.seed(7)
         observation = envs.reset()
-        alone = make()
+        alone = make(env_id)
         assert_same({k: v[1] for k, v in observation.items()}, dict(alone.reset(seed=8)[0]))
-        for actions in ACTIONS[:49]:
+        for actions in actions_before:
             observation, rewards, dones, infos = envs.step(actions)
             seen, reward, *_, info = alone.step(actions[1])
             assert_same({k: v[1] for k, v in observation.items()}, seen)
@@ -80,7 +101,7 @@ def test_subproc_vec_env_says_what_the_single_one_says():
             assert infos[1]["is_success"] == info["is_success"]
             assert not dones.any()
         goals = observation["desired_goal"]
-        observation, rewards, dones, infos = envs.step(ACTIONS[49])
+        observation, rewards, dones, infos = envs.step(last)
         assert dones.all()
         for world, info in enumerate(infos):
             assert info["TimeLimit.truncated"]

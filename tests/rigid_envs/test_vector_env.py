@@ -321,22 +321,24 @@ def test_a_partial_reset_leaves_the_other_worlds_alone(seed):
 
 
 @pytest.mark.parametrize("mode", [NEXT_STEP, SAME_STEP])
-def test_saving_and_going_back_repeats_to_the_last_bit(mode):
-    envs = make_vec(70, autoreset_mode=mode)
+@pytest.mark.parametrize("env_id", IDS)
+def test_saving_and_going_back_repeats_to_the_last_bit(env_id, mode):
+    envs = make_vec(70, env_id, autoreset_mode=mode, max_episode_steps=EPISODE)
     envs.reset(seed=0)
-    actions = random_actions(120, 70)
-    list(steps_of(envs, actions[:50]))  # in NEXT_STEP mode the next step is a reset
+    actions = random_actions(120, 70, size=envs.single_action_space.shape[0])
+    list(steps_of(envs, actions[:EPISODE]))  # in NEXT_STEP mode the next step is a reset
     saved = pickle.loads(pickle.dumps(envs.get_state()))
-    expected = list(steps_of(envs, actions[50:]))
+    expected = list(steps_of(envs, actions[EPISODE:]))
     envs.set_state(saved)
-    assert_same(list(steps_of(envs, actions[50:])), expected)
+    assert_same(list(steps_of(envs, actions[EPISODE:])), expected)
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
-def test_a_copy_goes_on_by_itself_to_the_last_bit(clone):
-    envs = make_vec(130, threads=2)
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_copy_goes_on_by_itself_to_the_last_bit(env_id, clone):
+    envs = make_vec(130, env_id, threads=2)
     envs.reset(seed=0)
-    actions = random_actions(60, 130)
+    actions = random_actions(60, 130, size=envs.single_action_space.shape[0])
     list(steps_of(envs, actions[:20]))
     twin = clone(envs)
     expected = list(steps_of(envs, actions[20:]))

@@ -1,8 +1,8 @@
-"""A controller of Push."""
+"""A controller of Push, with all of its options."""
 
 import numpy as np
 
-from rigid_envs.tasks.push import FINGER, HALF, STRIDE
+from rigid_envs.tasks.push import FINGER, HALF, POST_RADIUS, POSTS, STRIDE
 
 Array = np.ndarray
 
@@ -12,19 +12,44 @@ _TRAVEL = 2.0 * HALF + FINGER + 0.02
 _BEHIND, _ASIDE = 1.5 * HALF + FINGER + 0.005, 0.012
 # m of the goal at which the finger stops pushing
 _DONE = 0.02
+# m of a post that the cube keeps, and m ahead that it looks for posts
+_ROOM, _AHEAD = 0.048, 0.1
+# m from the goal at which a cube begins to turn to the yaw asked for; rad at which it stops
+_NEAR, _TURNED = 0.035, 0.12
+# m from the goal that will do for a cube at its yaw
+_REACHED = 0.043
+# m beside a face's middle at which the finger turns the cube at most, and m for each rad to turn
+_LEVER, _GAIN = 0.011, 0.03
 
 
-def push(observation: dict[str, Array]) -> Array:
+def push(observation: dict[str, Array], obstacles: int = 0) -> Array:
     """Goes over the cube to the side away from the goal, down, and pushes along the line.
 
     Each step is decided from the present alone: a finger that has slipped off the line rises and
-    comes down behind the cube again.
+    comes down behind the cube again. A goal with a heading is told by its size.
+
+    Args:
+        observation: of Push with any options.
+        obstacles: number of its posts, which the observation doesn't tell.
     """
     values = observation["observation"].astype(float)
     finger, cube = values[:, 0:3], values[:, 6:9]
-    to_goal = (observation["desired_goal"] - observation["achieved_goal"])[:, :2].astype(float)
+    achieved, desired = (observation[f"{k}_goal"].astype(float) for k in ("achieved", "desired"))
+    to_goal = (desired - achieved)[:, :2]
     apart = np.sqrt(np.sum(to_goal**2, axis=1, keepdims=True))
     ahead = to_goal / np.maximum(apart, 1e-9)
+    if obstacles:
+        ahead = _around(cube[:, :2], ahead, apart, POSTS[:obstacles])
+    if desired.shape[1] > 3:
+        yaw, wanted = (0.25 * np.arctan2(goal[:, 4], goal[:, 3]) for goal in (achieved, desired))
+        target = _by_faces(finger, cube, yaw, wanted, ahead, apart[:, 0], POSTS[:obstacles])
+    else:
+        target = _along(finger, cube, ahead, apart)
+    return np.clip((target - finger) / STRIDE, -1.0, 1.0)
+
+
+def _along(finger: Array, cube: Array, ahead: Array, apart: Array) -> Array:
+    """Where the finger should be [n, 3] m next to push along a direction."""
     from_cube = finger[:, :2] - cube[:, :2]
     along = np.sum(from_cube * ahead, axis=1)
     aside = from_cube - along[:, None] * ahead
@@ -48,4 +73,73 @@ def push(observation: dict[str, Array]) -> Array:
     target[pushing, :2], target[pushing, 2] = steered[pushing], HALF
     solved = apart[:, 0] < _DONE
     target[solved] = finger[solved]
-    return np.clip((target - finger) / STRIDE, -1.0, 1.0)
+    return target
+
+
+def _around(cube: Array, ahead: Array, apart: Array, posts: Array) -> Array:
+    """The direction [n, 2] nearest to `ahead` in which no post stands in the way."""
+    turns = np.pi / 24.0 * np.arange(-24, 24)
+    turned = np.stack([np.cos(turns), np.sin(turns)], axis=1)  # [turns, 2]
+    across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    ways = turned[:, :1] * ahead[:, None] + turned[:, 1:] * across[:, None]  # [n, turns, 2]
+    free = np.ones(ways.shape[:2], dtype=bool)
+    for post in posts:
+        to_post = post - cube
+        now = np.sqrt(np.sum(to_post**2, axis=1, keepdims=True))
+        along = np.sum(ways * to_post[:, None], axis=2)
+        nearest = np.clip(along, 0.0, np.minimum(apart, _AHEAD))[..., None] * ways
+        passing = np.sqrt(np.sum((to_post[:, None] - nearest) ** 2, axis=2))
+        free &= passing >= np.minimum(_ROOM, now - 1e-9)
+        free &= _finger_fits(cube[:, None] - _BEHIND * ways, post)
+    best = np.argmin(np.where(free, 0.0, 10.0) + np.abs(turns), axis=1)
+    return ways[np.arange(len(ways)), best]
+
+
+def _finger_fits(places: Array, post: Array) -> Array:
+    """Whether a finger at places [..., 2] doesn't touch a post."""
+    return np.sqrt(np.sum((places - post) ** 2, axis=-1)) > POST_RADIUS + FINGER + 0.002
+
+
+def _by_faces(
+    finger: Array, cube: Array, yaw: Array, wanted: Array, ahead: Array, apart: Array, posts: Array
+) -> Array:
+    """Where the finger should be [n, 3] m next to bring the cube to a goal and a yaw.
+
+    It pushes squarely against a face, whose middle it leaves to turn the cube: first into the
+    direction to the goal, and, near the goal, to the yaw that is asked for.
+    """
+    worlds = np.arange(len(cube))
+    error = np.mod(wanted - yaw + np.pi / 4.0, np.pi / 2.0) - np.pi / 4.0
+    normals = yaw[:, None] + np.pi / 2.0 * np.arange(4)
+    normals = np.stack([np.cos(normals), np.sin(normals)], axis=2)  # [n, 4, 2]
+    tangents = np.stack([-normals[..., 1], normals[..., 0]], axis=2)
+    from_cube = (finger - cube)[:, None, :2]
+    x, y = np.sum(from_cube * normals, axis=2), np.sum(from_cube * tangents, axis=2)
+    low = finger[:, 2] < HALF + 0.02
+    behind = (x < -0.8 * (HALF + FINGER)) & (np.abs(y) < HALF + 0.004) & low[:, None]
+    score = np.sum(normals * ahead[:, None], axis=2) + 0.25 * behind
+    for post in posts:
+        score -= 2.0 * ~_finger_fits(cube[:, None, :2] - _BEHIND * normals, post)
+    face = np.argmax(score, axis=1)
+    normal, tangent, behind = normals[worlds, face], tangents[worlds, face], behind[worlds, face]
+    x, y = x[worlds, face], y[worlds, face]
+
+    near = apart < _NEAR
+    bearing = np.arctan2(np.sum(ahead * tangent, axis=1), np.sum(ahead * normal, axis=1))
+    lever = -np.clip(_GAIN * np.where(near, error, bearing), -_LEVER, _LEVER)
+    place = cube[:, :2] - _BEHIND * normal + lever[:, None] * tangent
+    over = np.sqrt(np.sum((finger[:, :2] - place) ** 2, axis=1)) < _ASIDE
+
+    target = np.empty_like(finger)
+    target[:, :2], target[:, 2] = place, _TRAVEL
+    rising = ~behind & (finger[:, 2] < _TRAVEL - 0.01)
+    target[rising, :2] = finger[rising, :2]
+    descending = over & ~behind
+    target[descending, 2] = HALF
+    stride = np.where(near, 0.012, np.clip(0.6 * apart, 0.004, 0.025))
+    stride *= np.clip(1.2 - np.abs(y - lever) / 0.015, 0.0, 1.0)
+    steered = finger[:, :2] + stride[:, None] * normal + (lever - y)[:, None] * tangent
+    target[behind, :2], target[behind, 2] = steered[behind], HALF
+    solved = (apart < _REACHED) & (np.abs(error) < _TURNED)
+    target[solved] = finger[solved]
+    return target
