@@ -273,6 +273,20 @@ def test_a_yaw_within_fifteen_degrees_counts_and_so_does_a_quarter_turn_more(deg
     assert info["is_success"] == (abs((degrees + 45) % 90 - 45) <= 15)
 
 
+def test_dots_mark_the_corners_of_a_cube_at_the_yaw_asked_for():
+    env = make(target_yaw=True)
+    env.reset(seed=4)
+    goal = env._runner.goals[0].astype(float)
+    _, *dots = env._runner.task.signs(env._runner.world, 0, goal)
+    yaw = 0.25 * np.arctan2(goal[4], goal[3])
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    corners = goal[:2] + CORNERS[::2, :2] @ turn.T
+    marked = np.array([dot.position[:2] for dot in dots])
+    apart = np.linalg.norm(corners[:, None] - marked, axis=2)
+    np.testing.assert_allclose(apart.min(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-9)
+
+
 def test_reach_is_of_the_place_behind_the_cube_whatever_yaw_is_asked_for():
     plain, other = make_vec(50), make_vec(50, target_yaw=True)
     for envs in (plain, other):
