@@ -109,10 +109,13 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
     moving = np.where(np.arange(len(solids)) < layout.movers, widths, np.inf)
     reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
     # of a wide face few samples lie where a narrow one touches it, so the narrow one's bear the
-    # more: half and half of equal ones
+    # more: half and half of equal ones. Which of its faces a solid touches with isn't known: it
+    # counts as the cube of its volume
     shared = np.array([side.shared for side in sides], dtype=bool)
-    own = np.where(shared, widths[:, a], 1.0)
-    other = np.where(shared, widths[:, b], 1.0)
+    volumes = np.array([1.0 if isinstance(s, Ground) else s.shape.volume for s in solids])
+    breadth = np.cbrt(volumes) * size
+    own = np.where(shared, breadth[:, a], 1.0)
+    other = np.where(shared, breadth[:, b], 1.0)
     own, other = own * own, other * other
     sampled = np.array([side.samples.radius for side in sides])
     rounded = np.array([side.surface.radius for side in sides])
