@@ -31,8 +31,7 @@ SOLID = np.dtype(
         ("rotation", "f8", (9, LANES)),  # matrix, row by row: body frame to world frame
         ("velocity", "f8", (3, LANES)),  # m/s
         ("spin", "f8", (3, LANES)),  # rad/s
-        ("moved", "f8", (3, LANES)),  # m, by the last drift
-        ("swept", "f8", (LANES,)),  # m that a surface point was turned beyond that, at most
+        ("path", "f8", (LANES,)),  # m that a surface point has moved at most in the last drift
         # of the side at work
         ("pressed", "f8", (LANES,)),  # N, sum of normal forces
         ("bearing", "f8", (LANES,)),  # sum of the weights that touch
@@ -48,7 +47,6 @@ MEETING = np.dtype(
         ("count", "i8", (LANES,)),  # candidates
         ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
         ("first_touch", "f8", (LANES,)),  # s, NaN before
-        ("first_position", "f8", (3, LANES)),  # m, where the pair's first solid was then
         ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
         ("bore", "f8", (LANES,)),  # weight that touched in the last step
         ("bearing", "f8", (LANES,)),  # in this step
@@ -230,9 +228,7 @@ def load(model, state, work, chosen, g):
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.mover.shape[0]):
             solid = work.solid[m]
-            solid.swept[i] = 0.0
-            for c in range(3):
-                solid.moved[c, i] = 0.0
+            solid.path[i] = 0.0
             if active:
                 row = state.mover[w, m]
                 for c in range(3):
@@ -264,8 +260,6 @@ def load(model, state, work, chosen, g):
                 side.first_touch[i] = found.first_touch
                 side.pressed[i] = found.pressed
                 side.bore[i] = found.bore
-                for c in range(3):
-                    side.first_position[c, i] = found.first_position[c]
             else:
                 side.count[i] = 0
                 side.travel[i] = 1e300
@@ -278,37 +272,30 @@ def load(model, state, work, chosen, g):
 
 
 @stage
-def clear_pressed(model, work):
-    """Before the contacts of a step: nothing presses."""
-    keeps = work.lane[0].keeps
-    for k in range(model.side.shape[0]):
-        pressed = work.side[k].pressed
-        for i in range(LANES):
-            pressed[i] = 0.0 if keeps[i] != 0 else pressed[i]
-
-
-@stage
-def note_touch(model, work, k, pressed, elapsed):
+def note_touch(model, state, work, g, k, pressed, elapsed):
     """Notes how hard a side presses, `pressed` [N], and when and where it does so first."""
-    side, solids = work.side[k], model.side[k]
-    position = work.solid[min(solids.owner, solids.surface)].position
-    first, where, start = side.first_touch, side.first_position, work.lane[0].start
-    keeps, noted = work.lane[0].keeps, side.pressed
+    side, keeps = work.side[k], work.lane[0].keeps
+    first, noted, start = side.first_touch, side.pressed, work.lane[0].start
     new = 0
     for i in range(LANES):
         noted[i] = pressed[i] if keeps[i] != 0 else noted[i]
         before = (pressed[i] <= 0.0) | (first[i] <= start[i] + elapsed) | (keeps[i] == 0)
         new += 0 if before else 1
     if new > 0:
-        for i in range(LANES):
-            time = start[i] + elapsed
-            if not ((pressed[i] <= 0.0) | (first[i] <= time) | (keeps[i] == 0)):
-                first[i] = time
-                where[0, i], where[1, i], where[2, i] = (
-                    position[0, i],
-                    position[1, i],
-                    position[2, i],
-                )
+        note_first(model, state, work, g, k, pressed, elapsed)
+
+
+@kernel
+def note_first(model, state, work, g, k, pressed, elapsed):
+    """Notes when and where a side presses for the first time, in the lanes in which it does."""
+    first, keeps, start = work.side[k].first_touch, work.lane[0].keeps, work.lane[0].start
+    position = work.solid[min(model.side[k].owner, model.side[k].surface)].position
+    for i in range(LANES):
+        time = start[i] + elapsed
+        if pressed[i] > 0.0 and not first[i] <= time and keeps[i] != 0:
+            first[i] = time
+            for c in range(3):
+                state.side[g * LANES + i, k].first_position[c] = position[c, i]
 
 
 @stage
@@ -343,7 +330,5 @@ def store(model, state, work, g, i, time):
         found.count = side.count[i]
         found.travel = side.travel[i]
         found.first_touch = side.first_touch[i]
-        found.pressed = side.pressed[i]
-        for c in range(3):
-            found.first_position[c] = side.first_position[c, i]
+        found.pressed = side.pressed[i] if side.count[i] > 0 else 0.0
         found.bore = side.bore[i]

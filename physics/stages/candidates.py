@@ -1,7 +1,6 @@
 """Candidates: the samples of a side that are nearer to its surface than the skin.
 
-A list stays complete while owner and surface have moved no further than the skin against each
-other; with an
+A list stays complete while owner and surface together have moved no further than the skin; with an
 empty list, no further than the nearest sample's distance. Each side keeps that allowance in
 `travel`, spends it with every drift, and is searched again when the next step might outrun it. What
 a contact remembers moves along from list to list. Slots behind the end of a list hold zeros, whose
@@ -216,16 +215,6 @@ def make_search(features):
     return search, clear
 
 
-@stage
-def relative_path(moved, other, swept, other_swept, i):
-    """Length in m that bounds how far points of two solids came nearer in the last drift.
-
-    What moves along with another doesn't use up their allowance.
-    """
-    dx, dy, dz = moved[0, i] - other[0, i], moved[1, i] - other[1, i], moved[2, i] - other[2, i]
-    return abs(dx) + abs(dy) + abs(dz) + swept[i] + other_swept[i]
-
-
 @cache
 def make_side_search(features):
     """Kernel that searches a side in the lanes that need it."""
@@ -253,7 +242,7 @@ def make_side_search(features):
         seen = look(work, side, work.relative[0])
         back = look(work, model.side[mirror], work.relative[1]) if mirror >= 0 else seen
         for i in range(LANES):
-            path = relative_path(owner.moved, surface.moved, owner.swept, surface.swept, i)
+            path = owner.path[i] + surface.path[i]
             if work.lane[0].active[i] and meeting.travel[i] < max(least * at(side.skin, i), path):
                 search(model, state, work, g, k, i, seen, 0, path)
                 if mirror >= 0:
@@ -281,11 +270,10 @@ def make_candidates(features):
             side = model.side[k]
             least, skin = 0.5 if opens else 0.0, side.skin
             travel = work.side[k].travel
-            owner, surface = work.solid[side.owner], work.solid[side.surface]
-            first, second, turned, swept = owner.moved, surface.moved, owner.swept, surface.swept
+            first, second = work.solid[side.owner].path, work.solid[side.surface].path
             spent = 0
             for i in range(LANES):
-                path = relative_path(first, second, turned, swept, i)
+                path = first[i] + second[i]
                 left = travel[i] - path
                 travel[i] = left
                 spent += 1 if left < max(path, least * at(skin, i)) else 0

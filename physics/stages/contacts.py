@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from physics.group import clear_pressed, note_touch
+from physics.group import note_touch
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
@@ -291,14 +291,13 @@ def make_contacts(features):
 
     @stage
     def contacts(model, state, work, g, h, drifted, elapsed):
-        clear_pressed(model, work)
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
                 side(model, state, work, (), g, k, h)
                 constants = model.side[k]
                 owner = work.solid[constants.owner]
                 seen = owner if constants.kind == PLANE else work.relative[0]
-                note_touch(model, work, k, seen.pressed, elapsed)
+                note_touch(model, state, work, g, k, seen.pressed, elapsed)
                 for i in range(LANES):
                     work.side[k].bearing[i] = seen.bearing[i]
         keeps = work.lane[0].keeps

@@ -25,7 +25,7 @@ cone can't turn into an ascent. Resistance against rolling and spinning is the s
 import math
 from functools import cache
 
-from physics.group import clear_pressed, note_touch
+from physics.group import note_touch
 from physics.jit import LANES, at, kernel, stage
 from physics.stages.drives import make_join_speeds
 from physics.stages.impacts import make_impacts
@@ -299,11 +299,10 @@ def make_impulses(features):
             owner.pressed[i] = 0.0
         candidate = state.candidate[g, first : first + here.shape[0]]
         book(here, candidate, owner, surface, keeps, h, owner.pressed)
-        note_touch(model, work, k, owner.pressed, elapsed)
+        note_touch(model, state, work, g, k, owner.pressed, elapsed)
 
     @kernel
     def impulses(model, state, work, g, h, drifted, elapsed):
-        clear_pressed(model, work)
         sides, touching = model.side.shape[0], 0
         for k in range(sides):
             touching += work.side[k].slots

@@ -79,13 +79,12 @@ def make_drift(features):
     def drift(model, work, time):
         for m in range(model.mover.shape[0]):
             solid, constants = work.solid[m], model.mover[m]
-            c, q, P, L, moved, swept = (
+            c, q, P, L, path = (
                 solid.position,
                 solid.orientation,
                 solid.momentum,
                 solid.angular_momentum,
-                solid.moved,
-                solid.swept,
+                solid.path,
             )
             inverse_mass, reaches, j = (
                 constants.inverse_mass,
@@ -98,10 +97,8 @@ def make_drift(features):
                 c[0, i] += dx
                 c[1, i] += dy
                 c[2, i] += dz
-                moved[0, i] = dx
-                moved[1, i] = dy
-                moved[2, i] = dz
-                swept[i] = 0.0
+                # the sum of absolute values is never less than the length, and needs no root
+                path[i] = abs(dx) + abs(dy) + abs(dz)
             if rotation == NO_ROTATION or not constants.turns:
                 continue
             far = 0
@@ -116,8 +113,7 @@ def make_drift(features):
                 q[1, i] = ny if near else y
                 q[2, i] = nz if near else z
                 q[3, i] = nw if near else w
-                # the sum of absolute values is never less than the length, and needs no root
-                swept[i] = reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
+                path[i] += reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
                 far += 0 if near else 1
             if far > 0:
                 for i in range(LANES):
@@ -132,6 +128,6 @@ def make_drift(features):
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        swept[i] = reach * (abs(ox) + abs(oy) + abs(oz))
+                        path[i] += reach * (abs(ox) + abs(oy) + abs(oz))
 
     return drift

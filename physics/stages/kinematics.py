@@ -36,10 +36,9 @@ def place_statics(model, work):
                 solid.position[c, i] = model.static[s, c]
                 solid.velocity[c, i] = 0.0
                 solid.spin[c, i] = 0.0
-                solid.moved[c, i] = 0.0
             for c in range(4):
                 solid.orientation[c, i] = model.static[s, 3 + c]
-            solid.swept[i] = 0.0
+            solid.path[i] = 0.0
             place(solid, i)
 
 

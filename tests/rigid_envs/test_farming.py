@@ -220,7 +220,7 @@ CASES = {
         ],
         50,
         0.95,
-        worlds=400,  # few targets are so near that reaching out for them comes close to a hit
+        worlds=200,  # few targets are so near that reaching out for them comes close to a hit
     ),
 }
 
