@@ -48,7 +48,7 @@ def make_write_back(features: Features):
     write_rows = make_write_rows(features)
 
     @stage
-    def write_back(model, state, work, rows, g, elapsed, last):
+    def write_back(model, state, work, table, g, elapsed, last):
         lane = work.lane[0]
         for i in range(LANES):
             if lane.active[i]:
@@ -56,7 +56,7 @@ def make_write_back(features: Features):
                 if last or diverged != 0:
                     w = g * LANES + i
                     store(model, state, work, g, i, lane.start[i] + elapsed)
-                    write_rows(model, state, w, rows)
+                    write_rows(model, state, w, table)
                     state.world[w].stale = 0
                     state.world[w].diverged = diverged
                     lane.active[i] = 0
@@ -80,7 +80,9 @@ def make_advance(features: Features):
     write_back = make_write_back(features)
 
     @entry
-    def advance(all_model, state, work, rows, chosen, first, last, h, substeps, collision_substeps):
+    def advance(
+        all_model, state, work, table, chosen, first, last, h, substeps, collision_substeps
+    ):
         _ = sources
         for g in range(first, last):
             model = constants(all_model, g)
@@ -107,7 +109,7 @@ def make_advance(features: Features):
                     done += 0 if look else 1
                     substep(model, state, work, g, h, done * h, opens, look)
                     opens, look = False, False
-                write_back(model, state, work, rows, g, done * h, done == substeps)
+                write_back(model, state, work, table, g, done * h, done == substeps)
                 if done == substeps:
                     break
         failed = 0

@@ -108,6 +108,17 @@ def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
     return room[first : first + size].view(dtype).reshape(shape)
 
 
+def columns(shape: tuple[int, ...], count: int, dtype: Any) -> Array:
+    """An empty array [*shape, count or a little more]: a column of worlds for each quantity.
+
+    Columns are an odd number of cache lines long. Else those of a power of two of worlds would all
+    begin in the same few sets of the cache, and writing a world's quantities would drive them out.
+    """
+    item = np.dtype(dtype).itemsize
+    lines = -(-count * item // 64) | 1
+    return np.empty((*shape, lines * 64 // item), dtype=dtype)
+
+
 def _on_records(function: Any) -> Any:
     """With NUMBA_DISABLE_JIT=1: the same function, on tables whose fields have names."""
 

@@ -30,8 +30,8 @@ class Readings:
     _base: Model
     _features: Features
     _state: State
-    _rows: Array
-    _rows_valid: bool
+    _table: Array
+    _table_valid: bool
     _sides_between: dict[tuple[int, int], Array]
     _readout: Callable[[Model, State, Array], object]
 
@@ -120,10 +120,10 @@ class Readings:
 
     def read(self) -> Readout:
         """A copy of all poses and velocities, drives after the bodies, in one pass."""
-        if not self._rows_valid:
-            self._readout(self._model, self._state, self._rows)
-            self._rows_valid = True
-        return Readout(self._rows.copy())
+        if not self._table_valid:
+            self._readout(self._model, self._state, self._table)
+            self._table_valid = True
+        return Readout(self._table.copy()[..., : self.count].transpose(2, 0, 1))
 
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""

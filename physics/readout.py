@@ -12,15 +12,17 @@ from physics.stages.kinematics import spin_of
 
 Array = np.ndarray
 
-WIDTH = 13
+WIDTH = 16
 
 
 class Readout(NamedTuple):
     """A copy of the movers' kinematics: bodies, then drives, in scene order.
 
+    In memory the worlds come last, so that NumPy works on all of them in one stretch.
+
     Attributes:
-        rows: [count, movers, 13] position m, quaternion x y z w with w >= 0, linear velocity m/s,
-            angular velocity rad/s, in the world frame.
+        rows: [count, movers, 16] position m, quaternion x y z w with w >= 0, linear velocity m/s,
+            angular velocity rad/s, in the world frame; and m, where a drive's servo pulls to.
     """
 
     rows: Array
@@ -45,6 +47,16 @@ class Readout(NamedTuple):
         """[count, movers, 3] rad/s."""
         return self.rows[..., 10:13]
 
+    @property
+    def kinematics(self) -> Array:
+        """[count, movers, 13] the four above, side by side."""
+        return self.rows[..., :13]
+
+    @property
+    def reference(self) -> Array:
+        """[count, movers, 3] m, where the servos of drives pull to; of bodies without meaning."""
+        return self.rows[..., 13:16]
+
 
 @cache
 def make_write_rows(features: Features):
@@ -52,26 +64,26 @@ def make_write_rows(features: Features):
     rotation = features.rotation
 
     @kernel
-    def write_rows(model, state, w, rows):
+    def write_rows(model, state, w, table):
         """`model`: of the world's group."""
         lane = w % LANES
-        for i in range(rows.shape[1]):
+        for i in range(table.shape[0]):
             m, constants = state.mover[w, i], model.mover[i]
-            rows[w, i, 0] = m.position[0]
-            rows[w, i, 1] = m.position[1]
-            rows[w, i, 2] = m.position[2]
+            table[i, 0, w] = m.position[0]
+            table[i, 1, w] = m.position[1]
+            table[i, 2, w] = m.position[2]
             x, y = m.orientation[0], m.orientation[1]
             z, s = m.orientation[2], m.orientation[3]
             # q and -q are the same rotation
             sign = -1.0 if s < 0.0 else 1.0
-            rows[w, i, 3] = sign * x
-            rows[w, i, 4] = sign * y
-            rows[w, i, 5] = sign * z
-            rows[w, i, 6] = sign * s
+            table[i, 3, w] = sign * x
+            table[i, 4, w] = sign * y
+            table[i, 5, w] = sign * z
+            table[i, 6, w] = sign * s
             inverse_mass = at(constants.inverse_mass, lane)
-            rows[w, i, 7] = inverse_mass * m.momentum[0]
-            rows[w, i, 8] = inverse_mass * m.momentum[1]
-            rows[w, i, 9] = inverse_mass * m.momentum[2]
+            table[i, 7, w] = inverse_mass * m.momentum[0]
+            table[i, 8, w] = inverse_mass * m.momentum[1]
+            table[i, 9, w] = inverse_mass * m.momentum[2]
             ox = 0.0
             oy = 0.0
             oz = 0.0
@@ -82,9 +94,12 @@ def make_write_rows(features: Features):
                     ox, oy, oz = spin_of(x, y, z, s, jx, jy, jz, L[0], L[1], L[2])
                 else:
                     ox, oy, oz = jx * L[0], jx * L[1], jx * L[2]
-            rows[w, i, 10] = ox
-            rows[w, i, 11] = oy
-            rows[w, i, 12] = oz
+            table[i, 10, w] = ox
+            table[i, 11, w] = oy
+            table[i, 12, w] = oz
+            table[i, 13, w] = m.reference[0]
+            table[i, 14, w] = m.reference[1]
+            table[i, 15, w] = m.reference[2]
 
     return write_rows
 
@@ -96,9 +111,9 @@ def make_readout(features: Features) -> Any:
     constants, write_rows = make_constants(features), make_write_rows(features)
 
     @entry
-    def readout(model, state, rows):
+    def readout(model, state, table):
         _ = sources
-        for w in range(rows.shape[0]):
-            write_rows(constants(model, w // LANES), state, w, rows)
+        for w in range(state.mover.shape[0]):
+            write_rows(constants(model, w // LANES), state, w, table)
 
     return readout

@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.clock import cut, make_advance
+from physics.commands import by_worlds, make_command, make_lead
 from physics.errors import ContactOverflow, SimulationDiverged
 from physics.features import NO_ROTATION
 from physics.fidelity import Fidelity, resolve
 from physics.group import Work
-from physics.jit import LANES
+from physics.jit import LANES, columns
 from physics.layout import Layout
 from physics.limits import cause_of_divergence, check_step
 from physics.model import Model, build, spread
@@ -82,7 +83,7 @@ class World(Variation):
         self._idle: list[Work] = []
         self._sides_between: dict[tuple[int, int], Array] = {}
         self._settled = False
-        self._rows = np.empty((self.count, len(self._base.mover), WIDTH))
+        self._table = columns((len(self._base.mover), WIDTH), self.count, float)
         self._state = allocate(self._base, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
         self._span, self._substeps = math.nan, 0
@@ -131,7 +132,7 @@ class World(Variation):
     def _forget(self, worlds: Array) -> None:
         """Clears what is hidden: candidates, contact memories, forces, divergence."""
         state = self._state
-        self._rows_valid = self._settled = False
+        self._table_valid = self._settled = False
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
         state.side["first_touch"][worlds] = np.nan
@@ -159,7 +160,7 @@ class World(Variation):
 
     def _run(self, h: float, substeps: int, worlds: Array) -> None:
         kernel = self._advance
-        model, state, rows = self._model, self._state, self._rows
+        model, state, table = self._model, self._state, self._table
         together = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
 
@@ -168,13 +169,13 @@ class World(Variation):
                 work = idle.pop()
             except IndexError:  # as many as threads are made, once
                 work = Work.of(self._base, self._features)
-            failed = kernel(model, state, work, rows, worlds, first, last, h, substeps, together)
+            failed = kernel(model, state, work, table, worlds, first, last, h, substeps, together)
             idle.append(work)
             return failed
 
         if share_out(run, groups, self.threads) == 0:
             # a world that diverged before isn't written, nor one that isn't advanced
-            self._rows_valid = self._rows_valid or bool(worlds.all())
+            self._table_valid = self._table_valid or bool(worlds.all())
             return
         diverged = np.flatnonzero((state.world["diverged"] != 0) & worlds).tolist()
         if diverged:
@@ -346,10 +347,9 @@ class World(Variation):
             velocity: [count, tools, 3] m/s, or what broadcasts to it; it holds until changed.
         """
         shape = (self.count, len(self.scene.tools), 3)
-        mover, drives = self._state.mover, slice(self._bodies, None)
-        mover["reference_velocity"][:, drives] = array("velocity", velocity, shape)
-        mover["reference"][:, drives] = mover["position"][:, drives]
-        self._settled = False
+        checked = array("velocity", velocity, shape)
+        make_command()(self._state.mover, self._bodies, by_worlds(checked))
+        self._table_valid = self._settled = False
 
     def move_drives(self, target: Any, time: float) -> None:
         """Lets every tool's reference move from where the reference is now to a target.
@@ -361,9 +361,9 @@ class World(Variation):
             time: s in which it is reached, and after which a new command is due.
         """
         shape = (self.count, len(self.scene.tools), 3)
-        mover, drives = self._state.mover, slice(self._bodies, None)
-        way = array("target", target, shape) - mover["reference"][:, drives]
-        mover["reference_velocity"][:, drives] = way / positive("time", time)
+        checked = array("target", target, shape)
+        time = positive("time", time)
+        make_lead()(self._state.mover, self._bodies, by_worlds(checked), time)
         self._settled = False
 
     def snapshot(self) -> Snapshot:
@@ -395,7 +395,7 @@ class World(Variation):
             self._write_parameters(other, saved.parameters.pick(other))
         for mine, theirs in zip(self._state, saved.state, strict=True):
             mine[...] = theirs
-        self._rows_valid = self._settled = False
+        self._table_valid = self._settled = False
 
     def _find_kernels(self) -> None:
         self._advance = make_advance(self._features)

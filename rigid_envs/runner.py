@@ -9,9 +9,11 @@ import numpy as np
 from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Snapshot, World
+from physics.jit import columns
 from physics.validation import choice, instance, integer
+from rigid_envs.bounds import clip
 from rigid_envs.draws import uniform
-from rigid_envs.goals import judge
+from rigid_envs.goals import distance
 from rigid_envs.randomization import Randomization
 from rigid_envs.rewards import REWARD_TYPES
 from rigid_envs.tasks import TASKS, Task
@@ -114,7 +116,7 @@ class Runner:
         self._elapsed = np.zeros(count, dtype=np.int64)
         self._now = self.world.read()
         self._apart = np.zeros(count)
-        self._goals = np.zeros((count, len(goal_low)), dtype=np.float32)
+        self._goals = np.zeros((count, len(goal_low)), dtype=np.float32, order="F")
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
@@ -179,17 +181,20 @@ class Runner:
     def observe(self) -> tuple[Observation, dict[str, Array]]:
         """Observation, and what is told beside it: info, [count] each."""
         now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
-        values = np.empty((self.count, len(self._low)), dtype=np.float32)
+        table = columns((len(self._low),), self.count, np.float32)
+        values = table.T[: self.count]
         self.task.observe(self.world, now, values[:, :seen])
         if self.observe_parameters:
             values[:, seen:split] = self.randomization.observed
-        values[:, split:] = self.task.achieved(self.world, now)
-        self._apart, outside = judge(values, self._low, self._high, self._goals)
-        achieved, desired = values[:, split:], self._goals.copy()
+        achieved, desired = values[:, split:], self._goals
+        achieved[...] = self.task.achieved(self.world, now)
+        outside = clip(table, self._low, self._high, self.count)
+        self._apart = distance(achieved, desired)
+        # as users expect them, a row for each world
         observation = {
-            "observation": values[:, :split],
-            "achieved_goal": achieved,
-            "desired_goal": desired,
+            "observation": values[:, :split].copy(),
+            "achieved_goal": achieved.copy(),
+            "desired_goal": desired.copy(),
         }
         success: Array = self.task.reward.success(self._apart)
         info: dict[str, Array] = {
@@ -208,7 +213,7 @@ class Runner:
         """
         shape = (self.count, len(self.task.actions))
         try:
-            array = np.asarray(actions, dtype=np.float64)
+            array = np.asarray(actions, dtype=np.float64, order="F")
         except (TypeError, ValueError):
             raise ValueError(f"action must be numbers of shape {shape}, got {actions!r}") from None
         if array.shape != shape:

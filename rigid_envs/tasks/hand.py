@@ -69,31 +69,27 @@ class Hand:
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by up to a stride along each axis; grip -1 closes it and 1 opens it."""
-        target = self.stride * actions[:, :3] + self.reference(world)
+        target = self.stride * actions[:, :3] + self.reference(now)
         hand, slack = self.place(now), 0.75 * self.stride
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
         half = 0.25 * self.widest * (actions[:, 3] + 1.0) + self.PAD
-        fingers = np.empty((len(target), 2, 3))
-        fingers[:, 0] = fingers[:, 1] = target
-        fingers[:, 0, 1] -= half
-        fingers[:, 1, 1] += half
-        world.move_drives(fingers, frame)
+        aside = half[:, None] * (0.0, 1.0, 0.0)
+        world.move_drives(np.stack([target - aside, target + aside], axis=1), frame)
 
     def place(self, now: Readout) -> Array:
         """The middle between the pads, [count, 3] m."""
-        return 0.5 * (now.rows[:, -2, :3] + now.rows[:, -1, :3])
+        return 0.5 * (now.position[:, -2] + now.position[:, -1])
 
-    def reference(self, world: World) -> Array:
+    def reference(self, now: Readout) -> Array:
         """Where the carriage's servo pulls to, [count, 3] m."""
-        fingers = world.drive_reference
-        return 0.5 * (fingers[:, 0] + fingers[:, 1])
+        return 0.5 * (now.reference[:, -2] + now.reference[:, -1])
 
-    def observe(self, world: World, now: Readout, out: Array) -> None:
+    def observe(self, now: Readout, out: Array) -> None:
         """Writes what `bounds` names, [count, 11]."""
-        near, far = now.rows[:, -2], now.rows[:, -1]
+        place, velocity = now.position, now.linear_velocity
         out[:, 0:3] = self.place(now)
-        out[:, 3:6] = 0.5 * (near[:, 7:10] + far[:, 7:10])
-        out[:, 6] = far[:, 1] - near[:, 1] - 2.0 * self.PAD
-        out[:, 7] = far[:, 8] - near[:, 8]
-        out[:, 8:11] = self.reference(world)
+        out[:, 3:6] = 0.5 * (velocity[:, -2] + velocity[:, -1])
+        out[:, 6] = place[:, -1, 1] - place[:, -2, 1] - 2.0 * self.PAD
+        out[:, 7] = velocity[:, -1, 1] - velocity[:, -2, 1]
+        out[:, 8:11] = self.reference(now)

@@ -150,16 +150,16 @@ class Push(Task):
 
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """Poses and velocities of finger and cube, and the way from one to the other."""
-        rows = now.rows
-        out[:, 0:3], out[:, 3:6] = rows[:, 1, 0:3], rows[:, 1, 7:10]
-        out[:, 6:19] = rows[:, 0]
-        np.subtract(rows[:, 0, :3], rows[:, 1, :3], out=out[:, 19:22], casting="same_kind")
+        finger, cube = now.position[:, 1], now.position[:, 0]
+        out[:, 0:3], out[:, 3:6] = finger, now.linear_velocity[:, 1]
+        out[:, 6:19] = now.kinematics[:, 0]
+        out[:, 19:22] = cube - finger
 
     def achieved(self, world: World, now: Readout) -> Array:
         """Where the cube is, and its heading if the goal asks for a yaw."""
         if not self.target_yaw:
             return now.position[:, 0]
-        return np.concatenate([now.position[:, 0], heading(now.rows[:, 0, 3:7])], axis=1)
+        return np.concatenate([now.position[:, 0], heading(now.orientation[:, 0])], axis=1)
 
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array

@@ -91,18 +91,17 @@ class Stack(Task):
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """The hand; poses and velocities of the cubes, and the way from the hand to each."""
         first = len(self.hand.bounds)
-        self.hand.observe(world, now, out[:, :first])
-        cubes = out[:, first:].reshape(len(out), self.blocks, 16)
-        cubes[:, :, :13] = now.rows[:, : self.blocks]
-        cubes[:, :, 13:] = now.position[:, : self.blocks] - out[:, None, 0:3]
-        out[:, first:] = cubes.reshape(len(out), -1)
+        self.hand.observe(now, out[:, :first])
+        for i in range(self.blocks):
+            cube = out[:, first + 16 * i : first + 16 * (i + 1)]
+            cube[:, :13] = now.kinematics[:, i]
+            cube[:, 13:] = now.position[:, i] - out[:, 0:3]
 
     def achieved(self, world: World, now: Readout) -> Array:
         """Where the cubes are, and 1 where no finger touches any."""
-        goals = np.empty((len(now.rows), 3 * self.blocks + 1))
-        goals[:, :-1] = now.position[:, : self.blocks].reshape(len(goals), -1)
-        goals[:, -1] = self._pressing(world).max(axis=(1, 2)) <= 0.0
-        return goals
+        cubes = [now.position[:, i] for i in range(self.blocks)]
+        free = self._pressing(world).max(axis=(1, 2)) <= 0.0
+        return np.concatenate([*cubes, free[:, None]], axis=1)
 
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
@@ -140,8 +139,8 @@ class Stack(Task):
     def _pressing(self, world: World) -> Array:
         """[count, blocks, 2] N with which each finger presses each cube."""
         n = self.blocks
-        pairs = [world.pressing(i, n + finger) for i in range(n) for finger in (0, 1)]
-        return np.stack(pairs, axis=1).reshape(-1, n, 2)
+        pairs = [[world.pressing(i, n + finger) for finger in (0, 1)] for i in range(n)]
+        return np.array(pairs).transpose(2, 0, 1)
 
 
 def _near(apart: Array) -> Array:

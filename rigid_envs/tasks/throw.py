@@ -82,11 +82,11 @@ class Throw(Task):
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """The hand, the ball, the way from one to the other, and whether the ball has landed."""
         first = len(self.hand.bounds)
-        self.hand.observe(world, now, out[:, :first])
-        ball = now.rows[:, BALL]
-        out[:, first : first + 3] = ball[:, 0:3]
-        out[:, first + 3 : first + 6] = ball[:, 7:10]
-        out[:, first + 6 : first + 9] = ball[:, 0:3] - out[:, 0:3]
+        self.hand.observe(now, out[:, :first])
+        ball = now.position[:, BALL]
+        out[:, first : first + 3] = ball
+        out[:, first + 3 : first + 6] = now.linear_velocity[:, BALL]
+        out[:, first + 6 : first + 9] = ball - out[:, 0:3]
         out[:, first + 9] = ~np.isnan(world.first_touch(BALL, GROUND))
 
     def achieved(self, world: World, now: Readout) -> Array:
