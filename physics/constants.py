@@ -48,9 +48,11 @@ def of_movers(layout: Layout, p: Parameters) -> Columns:
     weight = np.zeros((n, layout.movers, 3))
     weight[:, : layout.bodies] = p.mass[:, :, None] * layout.gravity + 0.0
     mass = [d.mass for d in drives if isinstance(d, Drive)]
-    reach = [s.shape.reach for s in layout.solids[: layout.movers] if not isinstance(s, Ground)]
+    shapes = [s.shape for s in layout.solids[: layout.movers] if not isinstance(s, Ground)]
+    rounded = layout.fidelity.geometry == "shape"
+    core = [s.reach - (s.surface(0.0).radius if rounded else 0.0) for s in shapes]
     return {
-        "reach": _of_solids(p.size, [1.0] * len(drives)) * np.array(reach),
+        "core_reach": _of_solids(p.size, [1.0] * len(drives)) * np.array(core),
         "inverse_mass": 1.0 / _of_solids(p.mass, mass),
         "inertia": inertia,
         "inverse_inertia": 1.0 / inertia,

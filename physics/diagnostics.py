@@ -16,7 +16,7 @@ from physics.shapes import PLANE
 from physics.stages.contacts import REPORT, make_side
 from physics.stages.kinematics import make_kinematics, place_statics, place_tools
 from physics.stages.points import make_points
-from physics.state import State
+from physics.state import FIRST_POSITION, FIRST_TOUCH, PRESSED, State
 
 Array = np.ndarray
 
@@ -100,6 +100,7 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
     copied = State(
         mover=state.mover[worlds].copy(),
         side=state.side[worlds].copy(),
+        touch=state.touch[..., worlds].copy(),
         world=state.world[worlds].copy(),
         sample_id=state.sample_id[alone].copy(),
         candidate=state.candidate[alone].copy(),  # contacts remember; a look leaves no trace
@@ -185,25 +186,24 @@ def contacts(model: Model, features: Features, state: State, world: int) -> Cont
 
 def first_touch(state: State, sides: Array) -> Array:
     """When two solids first touched, [w] s, NaN before, by the sides between them."""
-    touches = state.side["first_touch"]
-    return np.asarray(functools.reduce(np.fmin, (touches[:, k] for k in sides)))
+    touches = state.touch[:, FIRST_TOUCH, : len(state.world)]
+    return np.asarray(functools.reduce(np.fmin, touches[sides]))
 
 
 def first_touch_position(state: State, sides: Array) -> Array:
     """Where the first of two solids was then, [w, 3] m, NaN before."""
-    touches, places = state.side["first_touch"], state.side["first_position"]
-    first = np.full(len(touches), np.inf)
-    found = np.full((len(touches), 3), np.nan)
-    for k in sides:
-        sooner = touches[:, k] < first
-        first[sooner], found[sooner] = touches[sooner, k], places[sooner, k]
-    return found
+    first, count = first_touch(state, sides), len(state.world)
+    found = np.full((3, count), np.nan)
+    for k in reversed(sides):
+        places = state.touch[k, FIRST_POSITION:, :count]
+        np.copyto(found, places, where=state.touch[k, FIRST_TOUCH, :count] == first)
+    return found.T
 
 
 def pressing(state: State, sides: Array) -> Array:
     """Sum of the normal forces between two solids in the last step, [w] N."""
-    pressed = state.side["pressed"]
-    return np.asarray(functools.reduce(np.add, (pressed[:, k] for k in sides)))
+    pressed = state.touch[:, PRESSED, : len(state.world)]
+    return np.asarray(functools.reduce(np.add, pressed[sides]))
 
 
 def between(model: Model, first: int, second: int) -> Array:

@@ -2,8 +2,8 @@
 
 State keeps worlds one after another. A kernel takes LANES of them at a time into a `Work`, whose
 arrays have the lane as their last axis, advances them together and writes them back. Every stage
-loops over the lanes without a branch, which LLVM turns into vector instructions: eight worlds for
-the price of one. Lanes never mix, so a world's result doesn't depend on what runs beside it.
+loops over the lanes without a branch, which LLVM turns into vector instructions: many worlds for
+the price of a few. Lanes never mix, so a world's result doesn't depend on what runs beside it.
 """
 
 from functools import cache
@@ -14,6 +14,7 @@ import numpy as np
 from physics.features import Features
 from physics.jit import LANES, aligned_zeros, kernel, stage
 from physics.model import Model
+from physics.state import FIRST_POSITION, FIRST_TOUCH, PRESSED
 
 Array = np.ndarray
 
@@ -31,7 +32,9 @@ SOLID = np.dtype(
         ("rotation", "f8", (9, LANES)),  # matrix, row by row: body frame to world frame
         ("velocity", "f8", (3, LANES)),  # m/s
         ("spin", "f8", (3, LANES)),  # rad/s
-        ("path", "f8", (LANES,)),  # m that a surface point has moved at most in the last drift
+        # of the last drift
+        ("shift", "f8", (3, LANES)),  # m
+        ("swing", "f8", (LANES,)),  # m that turning has moved a point at most
         # of the side at work
         ("pressed", "f8", (LANES,)),  # N, sum of normal forces
         ("bearing", "f8", (LANES,)),  # sum of the weights that touch
@@ -46,6 +49,7 @@ MEETING = np.dtype(
     [
         ("count", "i8", (LANES,)),  # candidates
         ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
+        ("path", "f8", (LANES,)),  # m that they have moved at most in the last drift
         ("first_touch", "f8", (LANES,)),  # s, NaN before
         ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
         ("bore", "f8", (LANES,)),  # weight that touched in the last step
@@ -228,7 +232,9 @@ def load(model, state, work, chosen, g):
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.mover.shape[0]):
             solid = work.solid[m]
-            solid.path[i] = 0.0
+            solid.swing[i] = 0.0
+            for c in range(3):
+                solid.shift[c, i] = 0.0
             if active:
                 row = state.mover[w, m]
                 for c in range(3):
@@ -257,8 +263,8 @@ def load(model, state, work, chosen, g):
                 found = state.side[w, k]
                 side.count[i] = found.count
                 side.travel[i] = found.travel
-                side.first_touch[i] = found.first_touch
-                side.pressed[i] = found.pressed
+                side.first_touch[i] = state.touch[k, FIRST_TOUCH, w]
+                side.pressed[i] = state.touch[k, PRESSED, w]
                 side.bore[i] = found.bore
             else:
                 side.count[i] = 0
@@ -295,7 +301,7 @@ def note_first(model, state, work, g, k, pressed, elapsed):
         if pressed[i] > 0.0 and not first[i] <= time and keeps[i] != 0:
             first[i] = time
             for c in range(3):
-                state.side[g * LANES + i, k].first_position[c] = position[c, i]
+                state.touch[k, FIRST_POSITION + c, g * LANES + i] = position[c, i]
 
 
 @stage
@@ -329,6 +335,6 @@ def store(model, state, work, g, i, time):
         side, found = work.side[k], state.side[w, k]
         found.count = side.count[i]
         found.travel = side.travel[i]
-        found.first_touch = side.first_touch[i]
-        found.pressed = side.pressed[i] if side.count[i] > 0 else 0.0
+        state.touch[k, FIRST_TOUCH, w] = side.first_touch[i]
+        state.touch[k, PRESSED, w] = side.pressed[i] if side.count[i] > 0 else 0.0
         found.bore = side.bore[i]

@@ -17,7 +17,6 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
 import numpy as np
 from numba import njit, typeof
 from numba.core import config, types
@@ -38,12 +37,11 @@ def _hash_sources() -> int:
 
 SOURCES: int = _hash_sources()
 
-# worlds that a kernel works on side by side, one to a vector lane
-LANES = 8
-
-# LLVM thinks a loop of less than sixteen turns too short to check that its arrays don't overlap
-# before it runs as vector instructions. Ours are exactly one vector long, and five times faster so
-llvm.set_option("", f"-vectorizer-min-trip-count={LANES}")
+# Worlds that a kernel works on side by side, one to a vector lane. Sixteen are two vectors of AVX-512
+# or four of AVX2. LLVM checks before every run of a loop that its arrays don't overlap, and thinks
+# one of fewer turns too short to be worth it; and vectors that don't wait for each other hide how
+# long a root or a division takes
+LANES = 16
 
 # Without reference counts: numba would count all arrays of a model and a state up and down, with
 # atomic instructions, wherever control flow is too rich for it to see that this is idle. The

@@ -26,7 +26,7 @@ Array = np.ndarray
 MOVER = np.dtype(
     [
         ("turns", "i8"),  # 1 for a body, 0 for a drive
-        ("reach", "f8"),  # m, farthest surface point from the centre
+        ("core_reach", "f8"),  # m, farthest point from the centre that turning moves
         ("inverse_mass", "f8"),  # 1/kg
         ("inertia", "f8", (3,)),  # kg m^2, principal moments; infinite for drives
         ("inverse_inertia", "f8", (3,)),  # 1/(kg m^2); 0 for drives
@@ -82,7 +82,7 @@ SIDE = np.dtype(
 )
 
 # what differs where worlds are varied
-MOVER_VARIES = ("reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
+MOVER_VARIES = ("core_reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
 SIDE_VARIES = (
     "core",
     "owner_radius",

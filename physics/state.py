@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.features import Features
-from physics.jit import LANES, aligned_zeros
+from physics.jit import LANES, aligned_zeros, columns
 from physics.model import Model
 
 Array = np.ndarray
@@ -31,13 +31,15 @@ FOUND = np.dtype(
     [
         ("count", "i8"),  # candidates
         ("travel", "f8"),  # m that both solids may still move before candidates are missing
-        ("first_touch", "f8"),  # s, NaN before
-        ("first_position", "f8", (3,)),  # m, where the pair's first solid was then
-        ("pressed", "f8"),  # N, sum of the normal forces of the last step
         ("bore", "f8"),  # weight of the samples that touched in the last step, of springs
     ],
     align=True,
 )
+
+# what is asked of a side after every frame, by its place in State.touch
+PRESSED = 0  # N, sum of the normal forces of the last step
+FIRST_TOUCH = 1  # s, NaN before
+FIRST_POSITION = 2  # and the two behind it: m, where the pair's first solid was then
 
 # one row a world
 STATUS = np.dtype(
@@ -86,6 +88,7 @@ class State(NamedTuple):
     Attributes:
         mover: [w, m] of MOVING.
         side: [w, k] of FOUND.
+        touch: [k, 5, w or a little more], see PRESSED: columns over the worlds.
         world: [w] of STATUS.
         sample_id: [groups, slots, LANES] of each candidate; LANES worlds make a group.
         candidate: [groups, slots] of candidate_dtype.
@@ -93,6 +96,7 @@ class State(NamedTuple):
 
     mover: Array
     side: Array
+    touch: Array
     world: Array
     sample_id: Array
     candidate: Array
@@ -110,13 +114,15 @@ def allocate(model: Model, features: Features, count: int) -> State:
     state = State(
         mover=np.zeros((count, len(model.mover)), dtype=MOVING),
         side=np.zeros((count, len(model.side)), dtype=FOUND),
+        touch=columns((len(model.side), 5), count, float),
         world=np.zeros(count, dtype=STATUS),
         sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
         candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
     )
     state.mover["orientation"][..., 3] = 1.0
     state.side["travel"] = -1.0
-    state.side["first_touch"] = np.nan
+    state.touch[...] = 0.0
+    state.touch[:, FIRST_TOUCH] = np.nan
     state.world["stale"] = 1
     return state
 

@@ -19,7 +19,7 @@ from physics.parameters import Parameters, with_parameters
 from physics.readout import WIDTH, make_readout
 from physics.scene import Body, Drive, Scene
 from physics.schedule import check_threads, share_out
-from physics.state import MOVING, State, allocate
+from physics.state import FIRST_TOUCH, MOVING, PRESSED, State, allocate
 from physics.state import copy as copy_state
 from physics.validation import array, instance, integer, positive
 from physics.variation import Variation, spin_momentum
@@ -135,8 +135,8 @@ class World(Variation):
         self._table_valid = self._settled = False
         state.world["stale"][worlds] = 1
         state.world["diverged"][worlds] = 0
-        state.side["first_touch"][worlds] = np.nan
-        state.side["pressed"][worlds] = 0.0
+        touch = state.touch[..., : self.count]
+        touch[:, PRESSED, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
         state.world["overflow"][worlds] = 0
 
     # --- time ---------------------------------------------------------------------------------

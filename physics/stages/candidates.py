@@ -237,12 +237,11 @@ def make_side_search(features):
         The impulse law chooses among the candidates of a pair, so both its sides are searched.
         """
         side, meeting = model.side[k], work.side[k]
-        owner, surface = work.solid[side.owner], work.solid[side.surface]
         mirror = side.mirror if impulse else -1
         seen = look(work, side, work.relative[0])
         back = look(work, model.side[mirror], work.relative[1]) if mirror >= 0 else seen
         for i in range(LANES):
-            path = owner.path[i] + surface.path[i]
+            path = meeting.path[i]
             if work.lane[0].active[i] and meeting.travel[i] < max(least * at(side.skin, i), path):
                 search(model, state, work, g, k, i, seen, 0, path)
                 if mirror >= 0:
@@ -256,6 +255,26 @@ def make_side_search(features):
     return side_search
 
 
+@stage
+def sink(shift, swing, path):
+    """How far a solid has moved at most along the normal of a plane, which is the world's z."""
+    for i in range(LANES):
+        path[i] = abs(shift[2, i]) + swing[i]
+
+
+@stage
+def part(shift, other_shift, swing, other_swing, path):
+    """How far two solids have moved at most, as seen from each other.
+
+    The sum of absolute values is never less than the length, and needs no root.
+    """
+    for i in range(LANES):
+        dx = shift[0, i] - other_shift[0, i]
+        dy = shift[1, i] - other_shift[1, i]
+        dz = shift[2, i] - other_shift[2, i]
+        path[i] = abs(dx) + abs(dy) + abs(dz) + swing[i] + other_swing[i]
+
+
 @cache
 def make_candidates(features):
     """Stage that spends the allowance of the last drift and searches where it is used up.
@@ -267,16 +286,19 @@ def make_candidates(features):
     @stage
     def candidates(model, state, work, g, opens):
         for k in range(model.side.shape[0]):
-            side = model.side[k]
+            side, meeting = model.side[k], work.side[k]
             least, skin = 0.5 if opens else 0.0, side.skin
-            travel = work.side[k].travel
-            first, second = work.solid[side.owner].path, work.solid[side.surface].path
+            owner, surface = work.solid[side.owner], work.solid[side.surface]
+            if side.kind == PLANE:
+                sink(owner.shift, owner.swing, meeting.path)
+            else:
+                part(owner.shift, surface.shift, owner.swing, surface.swing, meeting.path)
+            travel, path = meeting.travel, meeting.path
             spent = 0
             for i in range(LANES):
-                path = first[i] + second[i]
-                left = travel[i] - path
+                left = travel[i] - path[i]
                 travel[i] = left
-                spent += 1 if left < max(path, least * at(skin, i)) else 0
+                spent += 1 if left < max(path[i], least * at(skin, i)) else 0
             if spent > 0:
                 side_search(model, state, work, g, k, least)
 

@@ -79,16 +79,11 @@ def make_drift(features):
     def drift(model, work, time):
         for m in range(model.mover.shape[0]):
             solid, constants = work.solid[m], model.mover[m]
-            c, q, P, L, path = (
-                solid.position,
-                solid.orientation,
-                solid.momentum,
-                solid.angular_momentum,
-                solid.path,
-            )
+            c, q, P, L = solid.position, solid.orientation, solid.momentum, solid.angular_momentum
+            shift, swing = solid.shift, solid.swing
             inverse_mass, reaches, j = (
                 constants.inverse_mass,
-                constants.reach,
+                constants.core_reach,
                 constants.inverse_inertia,
             )
             for i in range(LANES):
@@ -97,8 +92,9 @@ def make_drift(features):
                 c[0, i] += dx
                 c[1, i] += dy
                 c[2, i] += dz
-                # the sum of absolute values is never less than the length, and needs no root
-                path[i] = abs(dx) + abs(dy) + abs(dz)
+                shift[0, i] = dx
+                shift[1, i] = dy
+                shift[2, i] = dz
             if rotation == NO_ROTATION or not constants.turns:
                 continue
             far = 0
@@ -113,7 +109,8 @@ def make_drift(features):
                 q[1, i] = ny if near else y
                 q[2, i] = nz if near else z
                 q[3, i] = nw if near else w
-                path[i] += reach * (abs(ox) + abs(oy) + abs(oz)) if near else 0.0
+                # the sum of absolute values is never less than the length, and needs no root
+                swing[i] = reach * (abs(ox) + abs(oy) + abs(oz))
                 far += 0 if near else 1
             if far > 0:
                 for i in range(LANES):
@@ -128,6 +125,6 @@ def make_drift(features):
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        path[i] += reach * (abs(ox) + abs(oy) + abs(oz))
+                        swing[i] = reach * (abs(ox) + abs(oy) + abs(oz))
 
     return drift

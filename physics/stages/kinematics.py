@@ -36,9 +36,10 @@ def place_statics(model, work):
                 solid.position[c, i] = model.static[s, c]
                 solid.velocity[c, i] = 0.0
                 solid.spin[c, i] = 0.0
+                solid.shift[c, i] = 0.0
             for c in range(4):
                 solid.orientation[c, i] = model.static[s, 3 + c]
-            solid.path[i] = 0.0
+            solid.swing[i] = 0.0
             place(solid, i)
 
 

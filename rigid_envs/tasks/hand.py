@@ -74,8 +74,10 @@ class Hand:
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
         half = 0.25 * self.widest * (actions[:, 3] + 1.0) + self.PAD
-        aside = half[:, None] * (0.0, 1.0, 0.0)
-        world.move_drives(np.stack([target - aside, target + aside], axis=1), frame)
+        fingers = np.stack([target, target], axis=1)
+        fingers[:, 0, 1] -= half
+        fingers[:, 1, 1] += half
+        world.move_drives(fingers, frame)
 
     def place(self, now: Readout) -> Array:
         """The middle between the pads, [count, 3] m."""

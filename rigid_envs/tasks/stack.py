@@ -100,7 +100,7 @@ class Stack(Task):
     def achieved(self, world: World, now: Readout) -> Array:
         """Where the cubes are, and 1 where no finger touches any."""
         cubes = [now.position[:, i] for i in range(self.blocks)]
-        free = self._pressing(world).max(axis=(1, 2)) <= 0.0
+        free = self._pressing(world).max(axis=(0, 1)) <= 0.0
         return np.concatenate([*cubes, free[:, None]], axis=1)
 
     def terms(
@@ -110,16 +110,17 @@ class Stack(Task):
 
         They are 0 to 1, and so is `stage`, all of it in one number.
         """
-        n = self.blocks
-        cubes = achieved[:, :-1].reshape(-1, n, 3)
-        away = distance(cubes, desired[:, :-1].reshape(-1, n, 3))
-        placed = np.cumprod(away <= THRESHOLD, axis=1).sum(axis=1)
-        done, next_one = placed == n, np.minimum(placed, n - 1)
-        worlds = np.arange(len(cubes))
-        hand = self.hand.place(now)
-        near = _near(distance(cubes[worlds, next_one], hand))
-        held = self._pressing(world)[worlds, next_one].min(axis=1) > 0.0
-        place = _near(away[worlds, next_one])
+        n, hand = self.blocks, self.hand.place(now)
+        goal = [slice(3 * i, 3 * i + 3) for i in range(n)]
+        away = np.array([distance(achieved[:, i], desired[:, i]) for i in goal])
+        reach = np.array([distance(achieved[:, i], hand) for i in goal])
+        placed = np.cumprod(away <= THRESHOLD, axis=0).sum(axis=0)
+        done = placed == n
+        next_one = np.minimum(placed, n - 1)[None]
+        near = _near(np.take_along_axis(reach, next_one, axis=0)[0])
+        place = _near(np.take_along_axis(away, next_one, axis=0)[0])
+        both = self._pressing(world).min(axis=1) > 0.0
+        held = np.take_along_axis(both, next_one, axis=0)[0]
         free = achieved[:, -1]
         stage = np.where(done, 0.5 * free, 0.3 * near + 0.2 * held + 0.5 * place)
         return {
@@ -137,10 +138,10 @@ class Stack(Task):
         return [Ghost(half, p, c) for p, c in zip(places, BODY_COLORS, strict=False)]
 
     def _pressing(self, world: World) -> Array:
-        """[count, blocks, 2] N with which each finger presses each cube."""
+        """[blocks, 2, count] N with which each finger presses each cube."""
         n = self.blocks
         pairs = [[world.pressing(i, n + finger) for finger in (0, 1)] for i in range(n)]
-        return np.array(pairs).transpose(2, 0, 1)
+        return np.array(pairs)
 
 
 def _near(apart: Array) -> Array:

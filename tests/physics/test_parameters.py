@@ -28,7 +28,7 @@ from physics.reference import scenes
 from physics.reference.scenes import GRAVITY
 from tests.physics.test_world import digests
 
-COUNT = 11  # a group of eight, and a part of one
+COUNT = LANES + 3  # a group, and a part of one
 
 
 def everything():
@@ -80,6 +80,7 @@ def everything_of(world, i):
     state, (group, lane) = world._state, divmod(i, LANES)
     for table in (state.mover[i], state.side[i], state.world[i]):
         yield from (table[name] for name in table.dtype.names)
+    yield state.touch[..., i]
     yield state.sample_id[group, :, lane]
     yield from (state.candidate[n][group, ..., lane] for n in state.candidate.dtype.names)
 

@@ -47,7 +47,8 @@ def digests(world):
 
     def parts(w):
         group, lane = divmod(w, LANES)
-        yield from (state.mover[w], state.side[w], state.world[w], state.sample_id[group, :, lane])
+        yield from (state.mover[w], state.side[w], state.touch[..., w], state.world[w])
+        yield state.sample_id[group, :, lane]
         for name in state.candidate.dtype.names:
             yield state.candidate[name][group, ..., lane]
 
