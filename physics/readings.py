@@ -32,6 +32,7 @@ class Readings:
     _state: State
     _table: Array
     _table_valid: bool
+    _lent: bool
     _sides_between: dict[tuple[int, int], Array]
     _readout: Callable[[Model, State, Array], object]
 
@@ -119,11 +120,13 @@ class Readings:
         return self._read(self._state.mover["reference"][:, self._bodies :])
 
     def read(self) -> Readout:
-        """A copy of all poses and velocities, drives after the bodies, in one pass."""
+        """All poses and velocities as they are now, drives after the bodies: read-only."""
         if not self._table_valid:
+            self._table = np.empty_like(self._table) if self._lent else self._table
             self._readout(self._model, self._state, self._table)
             self._table_valid = True
-        return Readout(self._table.copy()[..., : self.count].transpose(2, 0, 1))
+        self._lent = True
+        return Readout(self._read(self._table[..., : self.count].transpose(2, 0, 1)))
 
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""

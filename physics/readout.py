@@ -16,7 +16,7 @@ WIDTH = 16
 
 
 class Readout(NamedTuple):
-    """A copy of the movers' kinematics: bodies, then drives, in scene order.
+    """The movers' kinematics at one time: bodies, then drives, in scene order; read-only.
 
     In memory the worlds come last, so that NumPy works on all of them in one stretch.
 

@@ -84,6 +84,7 @@ class World(Variation):
         self._sides_between: dict[tuple[int, int], Array] = {}
         self._settled = False
         self._table = columns((len(self._base.mover), WIDTH), self.count, float)
+        self._lent = False
         self._state = allocate(self._base, self._features, self.count)
         self._everyone = np.ones(self.count, dtype=bool)
         self._span, self._substeps = math.nan, 0
@@ -159,7 +160,12 @@ class World(Variation):
         self._run(self._span / self._substeps, self._substeps, self._mask(worlds))
 
     def _run(self, h: float, substeps: int, worlds: Array) -> None:
-        kernel = self._advance
+        kernel, everyone = self._advance, bool(worlds.all())
+        if self._lent:  # who has read the table keeps it
+            before = self._table
+            self._table, self._lent = np.empty_like(before), False
+            if self._table_valid and not everyone:
+                self._table[...] = before
         model, state, table = self._model, self._state, self._table
         together = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
@@ -175,7 +181,8 @@ class World(Variation):
 
         if share_out(run, groups, self.threads) == 0:
             # a world that diverged before isn't written, nor one that isn't advanced
-            self._table_valid = self._table_valid or bool(worlds.all())
+            self._table_valid = self._table_valid or everyone
+            self._settled = self._settled or (everyone and substeps > 0)
             return
         diverged = np.flatnonzero((state.world["diverged"] != 0) & worlds).tolist()
         if diverged:
