@@ -130,7 +130,11 @@ class RigidEnv(gym.Env[Observation, Array]):
         return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""
+        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+
+        Raises:
+            ValueError: with the dense reward, other goals than those of the info's step.
+        """
         runner = self._runner
         reward = runner.task.reward
         return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
@@ -165,4 +169,4 @@ def _first(observation: Observation) -> Observation:
 
 
 def _first_info(info: dict[str, Array]) -> dict[str, Any]:
-    return {name: values.item() for name, values in info.items()}
+    return {name: values.item() if values.ndim == 1 else values[0] for name, values in info.items()}

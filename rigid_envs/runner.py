@@ -15,7 +15,7 @@ from rigid_envs.bounds import clip
 from rigid_envs.draws import uniform
 from rigid_envs.goals import distance
 from rigid_envs.randomization import Randomization
-from rigid_envs.rewards import REWARD_TYPES
+from rigid_envs.rewards import GOALS_OF_TERMS, REWARD_TYPES, goals_of_terms
 from rigid_envs.tasks import TASKS, Task
 
 Array = np.ndarray
@@ -33,7 +33,7 @@ class Step(NamedTuple):
         observation: dict of [count, ...] float32.
         reward: [count].
         terminated, truncated: [count] bool.
-        info: dict of [count] arrays.
+        info: dict of [count] arrays, or [count, n].
     """
 
     observation: Observation
@@ -179,7 +179,11 @@ class Runner:
         return self._goals
 
     def observe(self) -> tuple[Observation, dict[str, Array]]:
-        """Observation, and what is told beside it: info, [count] each."""
+        """Observation, and what is told beside it: info, [count] each.
+
+        With a dense reward, info["goals_of_terms"] [count, 2 goal] has the goals that the terms
+        hold for, so that `compute_reward` can tell others.
+        """
         now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
         table = columns((len(self._low),), self.count, np.float32)
         values = table.T[: self.count]
@@ -203,6 +207,8 @@ class Runner:
             "out_of_bounds": outside,
             **self.task.terms(self.world, now, achieved, desired, self._apart),
         }
+        if self.reward_type == "dense" and self.task.reward.of_task:
+            info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
         return observation, info
 
     def check_actions(self, actions: Any) -> Array:

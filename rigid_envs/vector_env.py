@@ -201,7 +201,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""
+        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+
+        Raises:
+            ValueError: with the dense reward, other goals than those of the info's step.
+        """
         runner = self._runner
         reward = runner.task.reward
         return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
