@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from physics import Fidelity
+from rigid_envs.arguments import make_task, words
 from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
@@ -53,7 +54,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         """Builds the world; an episode begins with `reset`."""
         self.render_mode = render_mode
         self._runner = Runner(
-            task,
+            make_task(task, arguments, words(RigidEnv)),
             1,
             reward_type,
             fidelity,
@@ -62,7 +63,6 @@ class RigidEnv(gym.Env[Observation, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
-            **arguments,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, size=render_size
