@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from physics import Fidelity
+from rigid_envs.arguments import make_task, words
 from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
@@ -53,7 +54,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         """Builds the world; an episode begins with `reset`."""
         self.render_mode = render_mode
         self._runner = Runner(
-            task,
+            make_task(task, arguments, words(RigidEnv)),
             1,
             reward_type,
             fidelity,
@@ -62,7 +63,6 @@ class RigidEnv(gym.Env[Observation, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
-            **arguments,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, size=render_size
@@ -130,7 +130,11 @@ class RigidEnv(gym.Env[Observation, Array]):
         return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""
+        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+
+        Raises:
+            ValueError: with the dense reward, other goals than those of the info's step.
+        """
         runner = self._runner
         reward = runner.task.reward
         return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
@@ -165,4 +169,4 @@ def _first(observation: Observation) -> Observation:
 
 
 def _first_info(info: dict[str, Array]) -> dict[str, Any]:
-    return {name: values.item() for name, values in info.items()}
+    return {name: values.item() if values.ndim == 1 else values[0] for name, values in info.items()}

@@ -34,13 +34,15 @@ class Randomization:
             "friction" and "restitution" of the bodies' material, and "noise", the standard
             deviation of what is added to each component of an action. What isn't named is as in
             the scene, and no noise.
-        sizes: whether the task takes bodies of other sizes.
+        sizes: least and largest factor of sizes that the task takes; None if it takes no other.
 
     Raises:
         TypeError, ValueError: an unknown name, or no such range.
     """
 
-    def __init__(self, scene: Scene, count: int, ranges: Any, sizes: bool) -> None:
+    def __init__(
+        self, scene: Scene, count: int, ranges: Any, sizes: tuple[float, float] | None
+    ) -> None:
         """Draws nothing yet: all worlds are as in the scene."""
         self._own = Parameters.of(scene)
         self._bodies, self._sizes = len(scene.bodies), sizes
@@ -85,12 +87,19 @@ class Randomization:
                 raise ValueError(
                     f"{field} must be (low, high) with low at most high, got {value!r}"
                 )
-            if name == "size" and not self._sizes:
-                raise ValueError(
-                    f"{field}: this task is laid out for bodies of one size, leave it out"
-                )
+            if name == "size":
+                self._check_sizes(field, ends)
             checked[name] = (low, high)
         return checked
+
+    def _check_sizes(self, field: str, ends: tuple[float, float]) -> None:
+        """Refuses sizes that the task isn't laid out for."""
+        if self._sizes is None:
+            raise ValueError(f"{field}: this task is laid out for bodies of one size, leave it out")
+        least, most = self._sizes
+        if ends[0] < least or ends[1] > most:
+            limits = f"within {least:g} and {most:g}" if least > 0.0 else f"at most {most:g}"
+            raise ValueError(f"{field} must be {limits} in this task, got {ends}")
 
     def _row(self, ranges: Mapping[str, tuple[float, float]]) -> Array:
         """[columns, 2] low and high of every draw."""

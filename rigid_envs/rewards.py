@@ -13,6 +13,8 @@ Array = np.ndarray
 REWARD_TYPES = ("sparse", "dense")
 # terms that follow from the goals
 OF_GOALS = ("success", "distance", "time")
+# in the info: the goals that the terms beside it were made for
+GOALS_OF_TERMS = "goals_of_terms"
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,11 @@ class Reward:
             achieved: [..., goal].
             desired: [..., goal].
             info: of the step: a dict, or a sequence of dicts for a batch; the sparse reward
-                doesn't look at it.
+                doesn't look at it, nor does a dense one whose terms all follow from the goals.
 
         Raises:
-            ValueError: goals of different shape; a dense reward whose terms aren't in the info.
+            ValueError: goals of different shape; a dense reward whose terms aren't in the info, or
+                are of other goals.
         """
         achieved, desired = np.asarray(achieved), np.asarray(desired)
         if achieved.shape != desired.shape:
@@ -71,17 +74,47 @@ class Reward:
         if kind == "sparse":
             reward = self.sparse(success)
         else:
-            reward = self.dense(success, apart, self._terms(info))
+            reward = self.dense(success, apart, self._terms(info, achieved, desired))
         return float(reward) if achieved.ndim == 1 else reward
 
-    def _terms(self, info: Any) -> dict[str, Array]:
-        names = [name for name in self.weights if name not in OF_GOALS]
+    @property
+    def of_task(self) -> list[str]:
+        """Names of the weighted terms that don't follow from the goals."""
+        return [name for name in self.weights if name not in OF_GOALS]
+
+    def _terms(self, info: Any, achieved: Array, desired: Array) -> dict[str, Array]:
+        """The task's terms from the info of the step that ended with these goals."""
+        names = self.of_task
+        if not names:
+            return {}
         try:
-            if isinstance(info, Mapping):
-                return {name: np.asarray(info[name]) for name in names}
-            return {name: np.array([one[name] for one in info]) for name in names}
+            found = {name: column(info, name) for name in (*names, GOALS_OF_TERMS)}
         except (KeyError, TypeError):
             raise ValueError(
-                f"the dense reward needs the terms {names} of the step's info, got "
+                f"the dense reward needs the terms {names} of the step's info, and "
+                f"{GOALS_OF_TERMS!r} beside them, got "
                 f'{info!r}; relabelled goals (HER) need reward_type="sparse"'
             ) from None
+        if not np.array_equal(found.pop(GOALS_OF_TERMS), goals_of_terms(achieved, desired)):
+            raise ValueError(
+                f"the dense reward of other goals than the step's can't be told: the terms {names} "
+                "of the info hold for the achieved and desired goal that the step returned alone; "
+                'relabelled goals (HER) need reward_type="sparse"'
+            )
+        return found
+
+
+def goals_of_terms(achieved: Array, desired: Array) -> Array:
+    """What the info says of the goals [..., goal] that its terms are of: [..., 2 goal]."""
+    return np.concatenate([achieved, desired], axis=-1)
+
+
+def column(info: Any, name: str) -> Array:
+    """An entry [...] of an info, or of each of a sequence of infos.
+
+    Raises:
+        KeyError, TypeError: there is none.
+    """
+    if isinstance(info, Mapping):
+        return np.asarray(info[name])
+    return np.array([one[name] for one in info])

@@ -1,8 +1,6 @@
 """The runner: a task on a world of any count. Both kinds of environment are thin adapters to it."""
 
-import inspect
 import math
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +9,13 @@ from gymnasium import spaces
 from physics import Fidelity, Parameters, Snapshot, World
 from physics.jit import columns
 from physics.validation import choice, instance, integer
+from rigid_envs.arguments import make_task, words
 from rigid_envs.bounds import clip
 from rigid_envs.draws import uniform
 from rigid_envs.goals import distance
 from rigid_envs.randomization import Randomization
-from rigid_envs.rewards import REWARD_TYPES
-from rigid_envs.tasks import TASKS, Task
+from rigid_envs.rewards import GOALS_OF_TERMS, REWARD_TYPES, goals_of_terms
+from rigid_envs.tasks import Task
 
 Array = np.ndarray
 Observation = dict[str, Array]
@@ -33,7 +32,7 @@ class Step(NamedTuple):
         observation: dict of [count, ...] float32.
         reward: [count].
         terminated, truncated: [count] bool.
-        info: dict of [count] arrays.
+        info: dict of [count] arrays, or [count, n].
     """
 
     observation: Observation
@@ -73,7 +72,7 @@ class Runner:
         **arguments: Any,
     ) -> None:
         """Builds the world; episodes begin with `reset`."""
-        self.task = _make_task(task, arguments)
+        self.task = make_task(task, arguments, words(Runner))
         self.reward_type = choice("reward_type", reward_type, REWARD_TYPES)
         scene = self.task.scene()
         self.randomization = Randomization(scene, count, randomize, self.task.sizes)
@@ -179,7 +178,11 @@ class Runner:
         return self._goals
 
     def observe(self) -> tuple[Observation, dict[str, Array]]:
-        """Observation, and what is told beside it: info, [count] each."""
+        """Observation, and what is told beside it: info, [count] each.
+
+        With a dense reward, info["goals_of_terms"] [count, 2 goal] has the goals that the terms
+        hold for, so that `compute_reward` can tell others.
+        """
         now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
         table = columns((len(self._low),), self.count, np.float32)
         values = table.T[: self.count]
@@ -203,6 +206,8 @@ class Runner:
             "out_of_bounds": outside,
             **self.task.terms(self.world, now, achieved, desired, self._apart),
         }
+        if self.reward_type == "dense" and self.task.reward.of_task:
+            info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
         return observation, info
 
     def check_actions(self, actions: Any) -> Array:
@@ -308,24 +313,6 @@ class Runner:
         self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
         self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]
         self._seeded = bool(np.all(self._episodes >= 0))
-
-
-def _make_task(task: Any, arguments: dict[str, Any]) -> Task:
-    """A task from its name or class, and arguments; or the task itself."""
-    known: list[str] = []
-    if not isinstance(task, Task):
-        if not (isinstance(task, type) and issubclass(task, Task)):
-            task = TASKS[choice("task", task, TASKS)]
-        known = list(inspect.signature(task).parameters)
-    name = (task if isinstance(task, type) else type(task)).__name__
-    for argument in arguments:
-        if argument not in known:
-            near = get_close_matches(argument, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise TypeError(
-                f"unknown argument {argument!r}: of its own, {name} has {known or 'none'}{hint}"
-            )
-    return task if isinstance(task, Task) else task(**arguments)
 
 
 def check_seed(field: str, value: Any) -> int:

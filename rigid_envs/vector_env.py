@@ -9,6 +9,7 @@ from gymnasium.vector.utils import batch_space
 
 from physics import Fidelity
 from physics.validation import choice, integer
+from rigid_envs.arguments import make_task, words
 from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.rewards import Reward
 from rigid_envs.runner import Observation, Runner, check_seed
@@ -73,7 +74,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
         self._runner = Runner(
-            task,
+            make_task(task, arguments, words(RigidVectorEnv)),
             self.num_envs,
             reward_type,
             fidelity,
@@ -82,7 +83,6 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
-            **arguments,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, render_worlds, render_size
@@ -201,7 +201,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._runner.task.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., 3]; see `rigid_envs.rewards.Reward.compute`."""
+        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+
+        Raises:
+            ValueError: with the dense reward, other goals than those of the info's step.
+        """
         runner = self._runner
         reward = runner.task.reward
         return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)

@@ -56,6 +56,31 @@ def test_every_command_has_help(command, capsys):
         (["record", "-f", "nowhere", "--algo", "sac"], "no run of sac"),
         (["plot", "nowhere"], "progress.csv is missing"),
         (["scripted", "--env", "Nothing-v0"], "no scripted controller"),
+        (["scripted", "--env-kwargs", "target_jaw:true"], "did you mean 'target_yaw'?"),
+        (["scripted", "--env-kwargs", "blocks:3"], "unknown argument 'blocks'"),
+        (
+            ["scripted", "--env-kwargs", "obstacles:many"],
+            "obstacles must be an integer, got 'many'",
+        ),
+        (["scripted", "--env-kwargs", "obstacles:5"], "obstacles must be at most 4, got 5"),
+        (["scripted", "--env-kwargs", "target_yaw:1"], "target_yaw must be bool, got 1"),
+        (["scripted", "--env-kwargs", "target_yaw"], "'target_yaw' should be KEY:VALUE"),
+        (
+            ["scripted", "--env-kwargs", "seed:3"],
+            "'seed' is none of the environment's: give --seed",
+        ),
+        (
+            ["scripted", "--env-kwargs", "max_episode_steps:many"],
+            "max_episode_steps must be an int",
+        ),
+        (["play", "--env-kwargs", "obstacles:5"], "obstacles must be at most 4, got 5"),
+        (
+            ["play", "--env-kwargs", "render_mode:human"],
+            "'render_mode' is none of the environment's",
+        ),
+        (["play", "--env-kwargs", "max_episode_steps:many"], "refuses {"),
+        (["evaluate", "scripted", "--env-kwargs", "obstacles:-1"], "obstacles must be at least 0"),
+        (["record", "scripted", "--env-kwargs", "randomize:heavy"], "randomize must be a dict"),
     ],
 )
 def test_mistakes_are_told_in_one_line(words, complaint, capsys, tmp_path, monkeypatch):

@@ -31,6 +31,20 @@ TRAIN_EXTRA = (
     "imageio_ffmpeg",
 )
 RENDER_EXTRA = ("pygame",)
+# what commands tell an environment, or a function beside its arguments, themselves
+OWN = {
+    "seed": "give --seed",
+    "episodes": "give --n-episodes",
+    "num_envs": "only train takes it, as --n-envs",
+    "env_id": "give --env; play takes it as its first word",
+    "render_mode": "the command chooses it",
+    "autoreset_mode": "the command chooses it",
+    "vectorization_mode": "the command chooses it",
+    "fps": "it is 25",
+    "policy": "it is the first word",
+    "video": "give --output",
+    "quiet": "there is no such choice",
+}
 INTERRUPTED = 130
 """Exit status of a command ended by Ctrl-C, as shells have it."""
 
@@ -163,15 +177,19 @@ def _config(options: argparse.Namespace) -> "TrainConfig":
 def _env_kwargs(options: argparse.Namespace) -> dict[str, Any]:
     from training.config import parse_settings
 
+    given = parse_settings(options.env_kwargs, "--env-kwargs")
+    for name in given:
+        if name in OWN:
+            raise UsageError(f"--env-kwargs: {name!r} is none of the environment's: {OWN[name]}")
     fidelity = {} if options.fidelity is None else {"fidelity": options.fidelity}
-    return {**parse_settings(options.env_kwargs, "--env-kwargs"), **fidelity}
+    return {**given, **fidelity}
 
 
 def _policy(options: argparse.Namespace) -> "Policy":
     from training.policy import SCRIPTED, scripted_policy, trained_policy
 
     if options.policy == SCRIPTED:
-        return scripted_policy(options.env or DEMO_ENV)
+        return scripted_policy(options.env or DEMO_ENV, **_env_kwargs(options))
     return trained_policy(
         Path(options.policy) if options.policy else _run_folder(options).path,
         algo=options.algo,

@@ -52,5 +52,6 @@ def _make(env_id: str, env_kwargs: dict[str, Any], make: Callable[[], Made]) -> 
         ) from None
     try:
         return make()
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, AssertionError, gym.error.Error) as error:
+        # Gymnasium asserts some of what it is given
         raise UsageError(f"{env_id} refuses {env_kwargs}: {error}") from error

@@ -66,7 +66,7 @@ class Push(Task):
     draws = 3 + 2 * TRIES
     camera = Camera(target=(-0.03, -0.04, 0.15), distance=1.28)
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
-    sizes = True
+    sizes = (0.0, 2.5)  # larger cubes would reach up to the finger at home
 
     def __init__(self, target_yaw: bool = False, obstacles: int = 0) -> None:
         """Adds what the options ask for to the goal and to the draws of a start."""

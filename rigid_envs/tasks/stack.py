@@ -34,6 +34,9 @@ class Stack(Task):
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
     # the fingers close across the picture
     camera = Camera(target=(0.0, 0.0, 0.14), distance=1.15, azimuth=-25.0, elevation=26.0)
+    # below, a cube beside the tower would be within the threshold of its place on it; above, the
+    # open fingers about a cube would reach the next one
+    sizes = (0.5, 1.5)
 
     def __init__(self, blocks: int = 2) -> None:
         """Lists what is observed of so many cubes."""
@@ -68,20 +71,25 @@ class Stack(Task):
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
-        """Cubes in places of their own, square to the fingers; the tower in one that is free."""
+        """Cubes in places of their own, square to the fingers; the tower in one that is free.
+
+        Heights are those of cubes of each world's sizes.
+        """
         n, count = self.blocks, len(draws)
         order = np.argsort(draws[:, : len(PLACES)], axis=1)[:, : n + 1]
         jitter = JITTER * (2.0 * draws[:, len(PLACES) :].reshape(count, n + 1, 2) - 1.0)
         places = PLACES[order] + jitter
-        position = np.full((count, n, 3), HALF)
+        size = world.parameters.size[mask] if world.features.varied else np.ones((count, n))
+        position = np.empty((count, n, 3))
         position[:, :, :2] = places[:, :n]
+        position[:, :, 2] = HALF * size
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
 
         goals = np.ones((count, 3 * n + 1))
         tower = goals[:, :-1].reshape(count, n, 3)
         tower[:, :, :2] = places[:, n, None]
-        tower[:, :, 2] = HALF * (1.0 + 2.0 * np.arange(n))
+        tower[:, :, 2] = HALF * (2.0 * np.cumsum(size, axis=1) - size)
         return goals
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
@@ -134,8 +142,9 @@ class Stack(Task):
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
         """A place for each cube, in its colour."""
         places = goal[:-1].reshape(-1, 3)
-        half = np.full(3, HALF)
-        return [Ghost(half, p, c) for p, c in zip(places, BODY_COLORS, strict=False)]
+        size = world.parameters.size[index] if world.features.varied else np.ones(self.blocks)
+        halves = np.full((self.blocks, 3), HALF) * size[:, None]
+        return [Ghost(h, p, c) for h, p, c in zip(halves, places, BODY_COLORS, strict=False)]
 
     def _pressing(self, world: World) -> Array:
         """[blocks, 2, count] N with which each finger presses each cube."""

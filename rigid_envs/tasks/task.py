@@ -25,7 +25,8 @@ class Task(ABC):
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
         camera: that sees all of the task.
-        sizes: whether `start` takes worlds whose bodies have sizes of their own.
+        sizes: least and largest factor of its bodies' sizes that `start` takes in worlds whose
+            bodies have sizes of their own; None if they must be as in the scene.
 
     What an instance needs to know beyond its class, as a number of blocks, are arguments of its
     constructor, which gym.make hands on.
@@ -38,7 +39,7 @@ class Task(ABC):
     draws: int
     reward: Reward
     camera: Camera = Camera()
-    sizes: ClassVar[bool] = False
+    sizes: ClassVar[tuple[float, float] | None] = None
 
     @abstractmethod
     def scene(self) -> Scene:

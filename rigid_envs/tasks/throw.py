@@ -39,6 +39,8 @@ class Throw(Task):
     )
     goal_bounds = tuple((f"ball {a}", "m", -5.0, 5.0) for a in "xyz")
     draws = 2
+    # above, the fingers would hardly open wider than the ball
+    sizes = (0.5, 1.75)
     # time makes it cost to hold the ball out at a near target, where success ends an episode
     reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0, "time": -1.0})
 
@@ -55,19 +57,27 @@ class Throw(Task):
         self._held: dict[Fidelity, tuple[Array, Array]] = {}
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
-        """The hand at home, the ball in it; the target in a sector of a ring, by even area."""
+        """The hand at home, the ball in it; the target in a sector of a ring, by even area.
+
+        How deep the pads press into a ball doesn't depend on its size, so that fingers about
+        another one are only farther apart, and no world needs to settle for itself.
+        """
         if world.fidelity not in self._held:
-            self._held[world.fidelity] = self._hold(world.fidelity)
+            self._held[world.fidelity] = self._hold(world)
         fingers, ball = self._held[world.fidelity]
+        size = world.parameters.size[mask, BALL] if world.features.varied else np.ones(len(draws))
+        fingers = np.repeat(fingers, len(draws), axis=0)
+        fingers[:, :, 1] += RADIUS * (size - 1.0)[:, None] * (-1.0, 1.0)
         world.reset(mask)
         world.set_state(drive_position=fingers, position=ball, worlds=mask)
         square = NEAREST**2 + (FARTHEST**2 - NEAREST**2) * draws[:, 0]
         far, angle = np.sqrt(square), ASIDE * (2.0 * draws[:, 1] - 1.0)
-        return np.stack([far * np.cos(angle), far * np.sin(angle), np.full(len(far), RADIUS)], 1)
+        return np.stack([far * np.cos(angle), far * np.sin(angle), RADIUS * size], 1)
 
-    def _hold(self, fidelity: Fidelity) -> tuple[Array, Array]:
+    def _hold(self, like: World) -> tuple[Array, Array]:
         """Where fingers and ball are once the grip has closed: how deep depends on the fidelity."""
-        world = World(self.scene(), fidelity)
+        # its numbers are those of worlds that are alike; varied only to share compiled kernels
+        world = World(self.scene(), like.fidelity, varied=like.features.varied)
         closed = np.array(self.hand.home) + np.zeros((2, 3))
         world.move_drives(closed, self.frame)
         for _ in range(10):
@@ -100,10 +110,11 @@ class Throw(Task):
         """`aim`: m, minus the distance of the target from where the ball would land, let go now."""
         landed = ~np.isnan(world.first_touch(BALL, GROUND))
         speed = now.linear_velocity[:, BALL]
-        height = np.maximum(achieved[:, 2] - RADIUS, 0.0).astype(float)
+        lying = desired[:, 2]  # the height of a ball on the ground, whatever its size
+        height = np.maximum(achieved[:, 2] - lying, 0.0).astype(float)
         flight = (speed[:, 2] + np.sqrt(speed[:, 2] ** 2 + 2.0 * GRAVITY * height)) / GRAVITY
         lands = achieved + np.where(landed, 0.0, flight)[:, None] * speed
-        lands[:, 2] = RADIUS
+        lands[:, 2] = lying
         return {"aim": -distance(lands, desired), "landed": landed.astype(float)}
 
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:

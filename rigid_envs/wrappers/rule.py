@@ -84,7 +84,7 @@ class Rule(ABC):
 
     @property
     def of_goal(self) -> bool:
-        """Whether a term from the info holds for no other desired goal than the step's."""
+        """Whether a term from the info holds for no other goals than the step's."""
         return False
 
     def remember(self, observation: Observation, action: Array) -> Array | None:

@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
+from rigid_envs.rewards import GOALS_OF_TERMS
 from rigid_envs.wrappers import potential, rules, staged
 from rigid_envs.wrappers.rule import Transition
 from rigid_envs.wrappers.wrapping import Wrapping
@@ -113,6 +114,8 @@ def _told(infos: Infos, told: dict[str, Array], begun: Array, replaced: Array) -
     for part, mask in parts:
         if mask.any():
             for name, values in told.items():
+                if name == GOALS_OF_TERMS and name in part:
+                    continue  # of worlds that were reset too, which it would take out
                 rows = mask.reshape(-1, *(1,) * (values.ndim - 1))
                 part[name] = np.where(rows, values, np.zeros_like(values))
                 part[f"_{name}"] = mask.copy()

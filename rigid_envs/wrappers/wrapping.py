@@ -11,13 +11,11 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv, VectorRewardWrapper, VectorWrapper
 from gymnasium.wrappers.vector import NormalizeReward as VectorNormalizeReward
 
-from rigid_envs.rewards import Reward
+from rigid_envs.rewards import GOALS_OF_TERMS, Reward, column, goals_of_terms
 from rigid_envs.wrappers.rule import Goals, Rule, Terms, Transition
 
 Array = np.ndarray
 
-# in the info: the desired goal that the terms beside it were made for
-GOAL_OF_TERMS = "goal_of_terms"
 # of Gymnasium; they change rewards and say nothing of goals
 _BLIND = (
     gym.RewardWrapper,
@@ -131,7 +129,7 @@ class Wrapping:
         paid, told = rule.pay(np.asarray(reward, dtype=np.float64), goals, {**read, **history})
         own = {name + self._suffix: value for name, value in {**history, **told}.items()}
         if rule.of_goal:
-            own[GOAL_OF_TERMS] = np.array(observation["desired_goal"])
+            own[GOALS_OF_TERMS] = goals_of_terms(goals.achieved, goals.desired)
         return paid, own
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
@@ -148,29 +146,29 @@ class Wrapping:
         """
         reward = _compute_reward_of(self.env)(achieved_goal, desired_goal, info)
         achieved, desired = np.asarray(achieved_goal), np.asarray(desired_goal)
-        terms = self._recall(info, desired)
+        terms = self._recall(info, goals_of_terms(achieved, desired))
         paid, _ = self.rule.pay(np.asarray(reward), Goals(achieved, desired, self._reward), terms)
         return float(paid) if achieved.ndim == 1 else paid
 
-    def _recall(self, info: Any, desired: Array) -> Terms:
-        """The terms that goals can't tell, from the info of a step."""
+    def _recall(self, info: Any, goals: Array) -> Terms:
+        """The terms that goals [..., 2 goal] can't tell, from the info of a step."""
         rule, name = self.rule, type(self).__name__
         keys = {term: term for term in rule.reads}
         keys |= {term: term + self._suffix for term in rule.kept}
         if not keys:
             return {}
-        wanted = [*keys.values(), *([GOAL_OF_TERMS] if rule.of_goal else [])]
+        wanted = [*keys.values(), *([GOALS_OF_TERMS] if rule.of_goal else [])]
         try:
-            found = {key: _column(info, key) for key in wanted}
+            found = {key: column(info, key) for key in wanted}
         except (KeyError, TypeError):
             raise ValueError(
                 f"{name}.compute_reward needs {wanted} of the step's info, got "
                 f"{_names(info)}. {_sentence(rule.advice)}"
             ) from None
-        if rule.of_goal and not np.array_equal(found[GOAL_OF_TERMS], desired):
+        if rule.of_goal and not np.array_equal(found[GOALS_OF_TERMS], goals):
             raise ValueError(
                 f"{name}.compute_reward can't move the goal: {list(keys.values())} of the info "
-                f"hold for the step's desired goal alone. {_sentence(rule.advice)}"
+                f"hold for the step's own goals alone. {_sentence(rule.advice)}"
             )
         return {term: found[key] for term, key in keys.items()}
 
@@ -236,12 +234,6 @@ def _reward_of(env: Any) -> Reward | None:
         if isinstance(reward, Reward):
             return reward
     return None
-
-
-def _column(info: Any, key: str) -> Array:
-    if isinstance(info, Mapping):
-        return np.asarray(info[key])
-    return np.array([one[key] for one in info])
 
 
 def _names(info: Any) -> str:

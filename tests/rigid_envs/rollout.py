@@ -60,7 +60,11 @@ def steps_of(env: gym.Env | VectorEnv, actions: np.ndarray) -> Iterator[tuple[An
 def one_world(result: tuple[Any, ...], world: int) -> tuple[Any, ...]:
     """What a vector environment's step, or reset, says of one world, as the single one says it."""
     *head, info = result
-    told = {k: v[world].item() for k, v in info.items() if not k.startswith(("_", "final"))}
+    told = {
+        k: v[world].item() if v.ndim == 1 else v[world]
+        for k, v in info.items()
+        if not k.startswith(("_", "final"))
+    }
     return *(_row(part, world) for part in head), told
 
 

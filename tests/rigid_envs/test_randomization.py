@@ -13,6 +13,8 @@ import rigid_envs  # noqa: F401
 from rigid_envs import scene_view
 from rigid_envs.draws import normal, uniform
 from rigid_envs.runner import Runner
+from rigid_envs.tasks import Push
+from training.scripted import CONTROLLERS
 
 RANGES = {
     "mass": (0.5, 2.0),
@@ -21,11 +23,11 @@ RANGES = {
     "size": (0.75, 1.25),
     "noise": (0.0, 0.2),
 }
-PUSH = "RigidEnvs/Push-v0"
+PUSH, STACK, THROW = (f"RigidEnvs/{task}-v0" for task in ("Push", "Stack", "Throw"))
 
 
-def actions(steps, count, seed=0):
-    return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, count, 3)).astype(np.float32)
+def actions(steps, count, seed=0, size=3):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, count, size)).astype(np.float32)
 
 
 def vector(count, **arguments):
@@ -83,11 +85,124 @@ def test_a_cube_of_another_size_lies_on_the_ground():
     np.testing.assert_allclose(runner.world.position[:, 0, 2], half, atol=5e-4)
 
 
+def test_cubes_of_other_sizes_lie_on_the_ground_and_stand_as_the_tower_that_is_asked_for():
+    runner = Runner("stack", 100, randomize={"size": (0.75, 1.4)}, blocks=3)
+    runner.reset(np.ones(100, dtype=bool), np.arange(100))
+    world, half = runner.world, 0.02 * runner.world.parameters.size
+    assert np.abs(half[:, 0] - half[:, 1]).max() > 0.01  # each cube has its own
+    np.testing.assert_allclose(world.position[:, :, 2], half, rtol=1e-14)
+    tower = runner.goals[:, :-1].reshape(100, 3, 3).astype(float)
+    np.testing.assert_allclose(tower[:, 0, 2], half[:, 0], rtol=1e-6)
+    for level in (1, 2):  # a face on a face
+        apart = tower[:, level, 2] - tower[:, level - 1, 2]
+        np.testing.assert_allclose(apart, half[:, level] + half[:, level - 1], rtol=1e-6)
+    world.advance(0.5)
+    np.testing.assert_allclose(world.position[:, :, 2], half, atol=5e-4)
+    world.set_state(position=tower)
+    for _ in range(5):
+        info = runner.step(np.zeros((100, 4))).info
+    assert info["is_success"].all()
+    np.testing.assert_allclose(world.position, tower, atol=3e-3)  # contacts yield under the load
+
+
+def test_no_stack_of_other_sizes_starts_solved_and_open_fingers_have_room():
+    """At the ends of what the task takes: a threshold high, and fingers fit between."""
+    for size in (0.5, 1.5):
+        runner = Runner("stack", 500, randomize={"size": size}, blocks=5)
+        runner.reset(np.ones(500, dtype=bool), np.arange(500))
+        assert not runner.observe()[1]["is_success"].any()
+    places = np.concatenate(
+        [runner.world.position, runner.goals[:, None, :3].astype(float)], axis=1
+    )[..., :2]
+    hand = 0.5 * runner.task.hand.widest + 2.0 * runner.task.hand.PAD
+    for i in range(6):
+        for j in range(i):
+            apart = np.abs(places[:, i] - places[:, j]).max(axis=1)
+            assert apart.min() >= hand + 1.5 * 0.02 - 1e-6
+
+
+@pytest.mark.parametrize(("fidelity", "yields"), [("fast", 1.5e-3), ("balanced", 1e-4)])
+def test_a_ball_of_another_size_is_held_as_deep_and_stays(fidelity, yields):
+    """The pads press as deep into any size, to round-off, and so no start depends on another."""
+    runner = Runner("throw", 100, fidelity=fidelity, randomize={"size": (0.5, 1.75)})
+    runner.reset(np.ones(100, dtype=bool), np.arange(100))
+    world, radius = runner.world, 0.02 * runner.world.parameters.size[:, 0]
+    np.testing.assert_allclose(runner.goals[:, 2], radius, rtol=1e-6)
+    opening = runner.observe()[0]["observation"][:, 6]
+    depth = radius - 0.5 * opening
+    np.testing.assert_allclose(depth, depth[0], atol=1e-8)
+    before = world.position[:, 0].copy()
+    for _ in range(25):
+        info = runner.step(np.tile([0.0, 0.0, 0.0, -1.0], (100, 1))).info
+    assert not info["landed"].any()
+    moved = world.position[:, 0] - before
+    np.testing.assert_allclose(moved, np.tile(moved[0], (100, 1)), atol=1e-6)
+    assert np.abs(moved).max() < 0.005
+    gap = np.diff(world.drive_position[:, :, 1], axis=1)[:, 0] - 0.03
+    np.testing.assert_allclose(radius - 0.5 * gap, depth, atol=yields)
+
+
+def test_where_a_ball_of_another_size_would_land_is_known():
+    runner = Runner("throw", 8, "dense", randomize={"size": (0.5, 1.75)})
+    runner.reset(np.ones(8, dtype=bool), np.arange(8))
+    world, desired = runner.world, runner.goals.astype(float)
+    world.set_state(position=desired[:, None] + (0.0, 0.0, 0.3))
+    world.advance(1e-3)
+    runner._now = world.read()
+    # straight down on the target, whose height is the ball's own radius
+    assert np.abs(runner.observe()[1]["aim"]).max() < 1e-3
+
+
+@pytest.mark.parametrize("env_id", [STACK, THROW])
+def test_a_start_of_another_size_does_not_depend_on_other_worlds(env_id):
+    """Nor do the steps after it; Push has the longer test above."""
+    ranges = {**RANGES, "size": (0.75, 1.4)}
+    many = gym.make_vec(env_id, num_envs=9, randomize=ranges)
+    seen = [many.reset(seed=5)[0]]
+    moves = actions(15, 9, size=4)
+    seen += [many.step(action)[0] for action in moves]
+    for i in (0, 8):
+        one = gym.make(env_id, randomize=ranges)
+        alone = [one.reset(seed=5 + i)[0], *(one.step(action)[0] for action in moves[:, i])]
+        for a, b in zip(alone, seen, strict=True):
+            for key, values in a.items():
+                assert values.tobytes() == b[key][i].tobytes()
+
+
+@pytest.mark.parametrize("env_id", [STACK, THROW])
+def test_sizes_of_one_change_no_bit(env_id):
+    found = []
+    for randomize in (None, {"size": 1.0}):
+        env = gym.make_vec(env_id, num_envs=4, reward_type="dense", randomize=randomize)
+        env.reset(seed=0)
+        found.append([env.step(action)[:2] for action in actions(15, 4, size=4)])
+    for (a, reward), (b, other) in zip(*found, strict=True):
+        assert reward.tobytes() == other.tobytes()
+        assert all(a[key].tobytes() == b[key].tobytes() for key in a)
+
+
+@pytest.mark.parametrize(("env_id", "steps", "least"), [(STACK, 100, 0.98), (THROW, 50, 0.98)])
+def test_a_scripted_controller_copes_with_other_sizes(env_id, steps, least):
+    """It knows them from the goal's heights alone; 200 seeds."""
+    env = gym.make_vec(env_id, num_envs=200, randomize={"size": (0.8, 1.2)})
+    observation, _ = env.reset(seed=0)
+    for _ in range(steps):
+        observation, _, _, truncated, info = env.step(CONTROLLERS[env_id](observation))
+    assert truncated.all()
+    assert info["is_success"].mean() >= least
+
+
 def test_a_picture_shows_the_size_that_was_drawn():
     runner = Runner("push", 2, randomize={"size": (1.5, 1.5)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
     cube = scene_view.items(runner, 1)[0]
     np.testing.assert_allclose(cube.shape.half_extents, 0.03)
+    runner = Runner("stack", 2, randomize={"size": (0.8, 1.2)})
+    runner.reset(np.ones(2, dtype=bool), np.arange(2))
+    cubes = scene_view.items(runner, 1)[:2]
+    ghosts = runner.task.signs(runner.world, 1, runner.goals[1])
+    for cube, ghost in zip(cubes, ghosts, strict=True):
+        np.testing.assert_allclose(ghost.half_extents, cube.shape.half_extents)
 
 
 def test_observed_parameters_are_those_drawn_and_lie_in_the_space():
@@ -235,8 +350,25 @@ def test_bad_ranges_are_named_at_construction_and_at_reset(ranges, error, messag
 
 
 def test_a_task_laid_out_for_one_size_takes_no_other():
+    class OneSize(Push):
+        sizes = None
+
     with pytest.raises(ValueError, match=r"randomize\['size'\]: this task is laid out for bodies"):
-        Runner("stack", 1, randomize={"size": (0.9, 1.1)})
+        Runner(OneSize, 1, randomize={"size": (0.9, 1.1)})
+
+
+@pytest.mark.parametrize(
+    ("task", "size", "wanted"),
+    [
+        ("push", (1.0, 3.0), "at most 2.5 in this task, got (1.0, 3.0)"),
+        ("stack", (0.4, 1.0), "within 0.5 and 1.5 in this task, got (0.4, 1.0)"),
+        ("stack", 1.6, "within 0.5 and 1.5 in this task, got (1.6, 1.6)"),
+        ("throw", (1.0, 2.0), "within 0.5 and 1.75 in this task, got (1.0, 2.0)"),
+    ],
+)
+def test_sizes_that_a_task_has_no_room_for_are_refused(task, size, wanted):
+    with pytest.raises(ValueError, match=re.escape(f"randomize['size'] must be {wanted}")):
+        Runner(task, 1, randomize={"size": size})
 
 
 def test_observed_parameters_need_ranges_and_options_stay_within_them():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_envs.rewards import Reward, distance
-from tests.rigid_envs.rollout import REWARDS, make, make_vec, random_actions, steps_of
+from tests.rigid_envs.rollout import IDS, REWARDS, make, make_vec, random_actions, steps_of
 
 REWARD = Reward(threshold=0.05, weights={"success": 1.0, "distance": 10.0, "reach": 0.3})
 ORIGIN = np.zeros(3, dtype=np.float32)
@@ -16,6 +16,11 @@ def goals(*shape: int) -> tuple[np.ndarray, np.ndarray]:
     return tuple(random.uniform(-0.06, 0.06, (*shape, 3)).astype(np.float32) for _ in range(2))
 
 
+def info_of(achieved, desired, reach):
+    """What a step's info would hold that ends with these goals."""
+    return {"reach": reach, "goals_of_terms": np.concatenate([achieved, desired], axis=-1)}
+
+
 @pytest.mark.parametrize(("apart", "reward"), [(0.0, 0.0), (0.0499, 0.0), (0.0501, -1.0)])
 def test_sparse_reward_is_zero_within_the_threshold_and_minus_one_beyond(apart, reward):
     goal = np.array([0.0, apart, 0.0], dtype=np.float32)
@@ -25,8 +30,10 @@ def test_sparse_reward_is_zero_within_the_threshold_and_minus_one_beyond(apart, 
 def test_dense_reward_is_the_sum_of_weighted_terms():
     near = np.array([0.03, 0.0, 0.04], dtype=np.float32)
     far = np.array([0.3, 0.0, 0.4], dtype=np.float32)
-    assert REWARD.compute("dense", far, ORIGIN, {"reach": -2.0}) == pytest.approx(-5.0 - 0.6)
-    assert REWARD.compute("dense", 0.9 * near, ORIGIN, {"reach": 1.0}) == pytest.approx(0.85)
+    told = info_of(far, ORIGIN, -2.0)
+    assert REWARD.compute("dense", far, ORIGIN, told) == pytest.approx(-5.0 - 0.6)
+    near *= 0.9
+    assert REWARD.compute("dense", near, ORIGIN, info_of(near, ORIGIN, 1.0)) == pytest.approx(0.85)
 
 
 def test_goals_are_as_far_apart_as_their_farthest_points():
@@ -49,16 +56,16 @@ def test_distance_of_a_row_does_not_depend_on_how_many_rows_there_are():
 def test_rewards_are_vectorised_over_leading_axes(kind, shape):
     achieved, desired = goals(*shape)
     terms = np.random.default_rng(1).uniform(-1.0, 0.0, shape)
-    rewards = REWARD.compute(kind, achieved, desired, {"reach": terms})
+    rewards = REWARD.compute(kind, achieved, desired, info_of(achieved, desired, terms))
     assert rewards.shape == shape
     for index in np.ndindex(shape):
-        info = {"reach": terms[index]}
+        info = info_of(achieved[index], desired[index], terms[index])
         assert rewards[index] == REWARD.compute(kind, achieved[index], desired[index], info)
 
 
 def test_the_reward_of_one_pair_of_goals_is_a_python_float():
     assert type(REWARD.compute("sparse", ORIGIN, ORIGIN, {})) is float
-    assert type(REWARD.compute("dense", ORIGIN, ORIGIN, {"reach": 0.0})) is float
+    assert type(REWARD.compute("dense", ORIGIN, ORIGIN, info_of(ORIGIN, ORIGIN, 0.0))) is float
 
 
 @pytest.mark.parametrize("info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reach": np.nan}])
@@ -74,15 +81,79 @@ def test_dense_reward_takes_a_dict_of_arrays_or_a_dict_for_each():
     achieved, desired = goals(7)
     terms = np.linspace(-1.0, 0.0, 7)
     np.testing.assert_array_equal(
-        REWARD.compute("dense", achieved, desired, [{"reach": x} for x in terms]),
-        REWARD.compute("dense", achieved, desired, {"reach": terms}),
+        REWARD.compute("dense", achieved, desired, list(map(info_of, achieved, desired, terms))),
+        REWARD.compute("dense", achieved, desired, info_of(achieved, desired, terms)),
     )
 
 
-@pytest.mark.parametrize("info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reech": 0.0}])
+@pytest.mark.parametrize(
+    "info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reech": 0.0}, {"reach": np.zeros(7)}]
+)
 def test_dense_reward_without_its_terms_names_them_and_the_way_out(info):
     with pytest.raises(ValueError, match=r"\['reach'\].*HER.*reward_type=\"sparse\""):
         REWARD.compute("dense", *goals(7), info)
+
+
+def other_goals(achieved, desired):
+    """Pairs of goals that differ from a pair in one number of one row, or in one pair for both."""
+    for moved in (0, 1):
+        pair = [achieved.copy(), desired.copy()]
+        pair[moved][..., -1] = np.nextafter(pair[moved][..., -1], np.float32(2.0))
+        yield pair
+    yield achieved, achieved  # as HER relabels the last step of an episode
+    yield desired, achieved
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_dense_reward_of_other_goals_than_the_steps_is_refused(env_id):
+    """Even if they are as far apart, as exchanged ones are: the terms hold for the step's own."""
+    env = make(env_id, reward_type="dense")
+    env.reset(seed=3)
+    observation, reward, _, _, info = env.step(env.action_space.sample())
+    step = observation["achieved_goal"], observation["desired_goal"]
+    for pair in other_goals(*step):
+        with pytest.raises(ValueError, match=r"other goals than the step's.*HER.*sparse"):
+            env.compute_reward(*pair, info)
+    assert env.compute_reward(*step, info) == reward
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_dense_reward_of_other_goals_is_refused_for_vectors(env_id):
+    envs = make_vec(4, env_id, reward_type="dense")
+    envs.reset(seed=3)
+    observation, reward, _, _, info = envs.step(envs.action_space.sample())
+    step = observation["achieved_goal"], observation["desired_goal"]
+    infos = [{key: info[key][i] for key in info} for i in range(4)]
+    for told in (info, infos):
+        for pair in other_goals(*step):
+            with pytest.raises(ValueError, match="other goals than the step's"):
+                envs.compute_reward(*pair, told)
+        swapped = [goals[[1, 0, 2, 3]] for goals in step]
+        with pytest.raises(ValueError, match="other goals than the step's"):
+            envs.compute_reward(*swapped, told)
+        np.testing.assert_array_equal(envs.compute_reward(*step, told), reward)
+
+
+def test_dense_reward_that_goals_tell_can_be_relabelled():
+    reward = Reward(threshold=0.05, weights={"success": 1.0, "distance": 2.0, "time": -1.0})
+    achieved, desired = goals(7)
+    assert reward.compute("dense", achieved, achieved, {}).tolist() == [0.0] * 7
+    apart = distance(achieved, desired)
+    expected = (apart <= 0.05) - 2.0 * apart - 1.0
+    np.testing.assert_allclose(reward.compute("dense", achieved, desired, None), expected)
+
+
+def test_the_last_info_of_an_ended_episode_tells_its_goals():
+    envs = make_vec(3, reward_type="dense", max_episode_steps=2, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    for _ in range(2):
+        _, reward, _, truncated, info = envs.step(np.ones((3, 3), dtype=np.float32))
+    assert truncated.all()
+    last = [
+        np.stack([end[key] for end in info["final_obs"]])
+        for key in ("achieved_goal", "desired_goal")
+    ]
+    np.testing.assert_array_equal(envs.compute_reward(*last, info["final_info"]), reward)
 
 
 @pytest.mark.parametrize("kind", REWARDS)

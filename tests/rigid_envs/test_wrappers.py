@@ -108,8 +108,8 @@ def test_a_wrapper_pays_by_its_formula_and_changes_nothing_else(name, kind):
 @pytest.mark.parametrize(
     ("name", "terms"),
     [
-        ("StagedReward", {"stages_done", "unstaged_reward", "goal_of_terms"}),
-        ("PotentialShaping", {"shaping", "goal_of_terms"}),
+        ("StagedReward", {"stages_done", "unstaged_reward", "goals_of_terms"}),
+        ("PotentialShaping", {"shaping", "goals_of_terms"}),
         ("ActionPenalty", {"action_square"}),
         ("SmoothnessPenalty", {"action_change"}),
         ("SuccessBonus", {"bonus_paid"}),

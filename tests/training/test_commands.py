@@ -5,6 +5,9 @@ import pytest
 from tests.training.reach import straight_to_the_goal
 from training import cli
 from training.policy import CONTROLLERS
+from training.scripted.push import push
+
+PUSH = "RigidEnvs/Push-v0"
 
 
 @pytest.fixture
@@ -49,6 +52,21 @@ def test_record_and_plot_write_into_the_run_folder(trained, tmp_path, capsys):
 def test_scripted_prints_its_table(reach, monkeypatch, capsys):
     monkeypatch.setitem(CONTROLLERS, reach, straight_to_the_goal)
     assert cli.main(["scripted", "--env", reach, "-n", "10"]) == 0
+    assert "100.0%" in capsys.readouterr().out
+
+
+def test_scripted_tells_its_controller_of_the_tasks_arguments(capsys, monkeypatch):
+    """Two posts in the way, which the observation doesn't show."""
+    told = []
+
+    def noted(observation, obstacles=0):
+        told.append((obstacles, observation["desired_goal"].shape[1]))
+        return push(observation, obstacles)
+
+    monkeypatch.setitem(CONTROLLERS, PUSH, noted)
+    words = ["scripted", "-n", "20", "--env-kwargs", "obstacles:2", "target_yaw:true"]
+    assert cli.main(words) == 0
+    assert set(told) == {(2, 5)}
     assert "100.0%" in capsys.readouterr().out
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigid_envs.tasks.hand import Hand
-from rigid_envs.tasks.stack import HALF, Stack
+from rigid_envs.tasks.stack import Stack
 
 Array = np.ndarray
 
@@ -15,8 +15,10 @@ _RESTS = 0.001
 _TRUE, _ABOVE = 0.0003, 0.003
 # m below its place to which it is pressed, and m/s at which it stands still
 _PRESS, _STILL = 0.004, 0.01
-# m of opening: below, the fingers hold a cube; above, they are free of one
-_HOLDS, _FREE = 2.0 * HALF + 0.003, 2.0 * HALF + 0.014
+# m of opening beyond a cube's width: below, the fingers hold it; above, they are free of it
+_HOLDS, _FREE = 0.003, 0.014
+# m that pads stay above the foot of a cube, so that they don't meet a wider one under it
+_FOOT = 0.003
 # m above what stands at which pads or a cube travel
 _CLEAR = 0.015
 # m/s
@@ -35,26 +37,32 @@ def stack(observation: dict[str, Array]) -> Array:
     seen = values[:, len(Hand.bounds) :].reshape(count, n, -1)
     cubes, motion = seen[:, :, 0:3], seen[:, :, 7:10]
 
-    under = np.concatenate([np.full((count, 1), -HALF), cubes[:, :-1, 2]], axis=1)
-    rests = cubes[:, :, 2] - under < 2.0 * HALF + _RESTS
+    halves = _halves(goals)
+    tops = cubes[:, :, 2] + halves
+    under = np.concatenate([np.zeros((count, 1)), tops[:, :-1]], axis=1)
+    rests = cubes[:, :, 2] - halves - under < _RESTS
     placed = rests & (np.sqrt(np.sum((cubes - goals) ** 2, axis=-1)) < _PLACED)
     done = placed.all(axis=1)
     which = np.where(done, 0, np.argmin(placed, axis=1))
-    cube, goal = cubes[worlds, which], goals[worlds, which]
-    holds = (np.abs(hand - cube).max(axis=1) < 0.75 * HALF) & (opening < _HOLDS) & ~done
+    cube, goal, half = cubes[worlds, which], goals[worlds, which], halves[worlds, which]
+    # where a hand takes it: low pads would meet the ground or what is under the cube
+    grasp = cube.copy()
+    grasp[:, 2] += np.maximum(Hand.PAD + _FOOT - half, 0.0)
+    near = np.abs(hand - grasp).max(axis=1) < 0.75 * half
+    holds = near & (opening < 2.0 * half + _HOLDS) & ~done
 
     # with a cube: up, across, down, and open
     below = goal.copy()
     on_tower = which > 0
     below[on_tower, :2] = cubes[worlds, which - 1][on_tower, :2]
-    highest = np.where(holds[:, None] & (np.arange(n) == which[:, None]), 0.0, cubes[:, :, 2])
-    top = highest.max(axis=1) + HALF
+    carried_one = holds[:, None] & (np.arange(n) == which[:, None])
+    top = np.where(carried_one, 0.0, tops).max(axis=1)
     target, grip = hand.copy(), np.full(count, OPEN)
     still = np.abs(motion[worlds, which]).max(axis=1) < _STILL
     off = np.sqrt(np.sum((cube - below)[:, :2] ** 2, axis=1))
     there = off < np.where(cube[:, 2] < goal[:, 2] + 2.0 * _ABOVE, _TRUE, _OVER)
     low = there & (cube[:, 2] < goal[:, 2] + 0.001) & still
-    carried = np.maximum(top + HALF, goal[:, 2]) + _CLEAR
+    carried = np.maximum(top + half, goal[:, 2]) + _CLEAR
     slow = np.abs(velocity[:, :2]).max(axis=1) < _SLOW
     up = holds & ((off > 2.0 * _OVER) | ~slow) & ~(there & (cube[:, 2] < carried - _CLEAR))
     grip[up | (holds & ~low)] = CLOSE
@@ -65,18 +73,28 @@ def stack(observation: dict[str, Array]) -> Array:
     target[down] += (below - cube)[down]
     target[down, 2] += np.where(there, -_PRESS, _ABOVE)[down]
     # without: free of what stands, up, across, down, and close
-    free = ~holds & (opening > _FREE)
+    free = ~holds & (opening > 2.0 * half + _FREE)
     travel = top + Hand.PAD + _CLEAR
     over = np.sqrt(np.sum((cube - hand)[:, :2] ** 2, axis=1)) < _OVER
     over &= np.abs(velocity[:, :2]).max(axis=1) < _SLOW
-    beside = over & (np.abs(hand[:, 2] - cube[:, 2]) < _OVER) & ~done
+    beside = over & (np.abs(hand[:, 2] - grasp[:, 2]) < _OVER) & ~done
     rise = free & (~over | done)
     target[rise, 2] = travel[rise]
     across = rise & ~done & (hand[:, 2] > travel - 0.5 * _CLEAR)
     target[across, :2] = cube[across, :2]
     fetch = free & over & ~done
-    target[fetch] = cube[fetch]
+    target[fetch] = grasp[fetch]
     grip[~holds & beside] = CLOSE
 
     strides = np.clip((target - reference) / Stack.hand.stride, -1.0, 1.0)
     return np.concatenate([strides, grip[:, None]], axis=1)
+
+
+def _halves(goals: Array) -> Array:
+    """Half the widths [n, cubes] m of cubes by their places in the tower [n, cubes, 3] m."""
+    halves = np.zeros(goals.shape[:2])
+    top = np.zeros(len(goals))
+    for i in range(goals.shape[1]):
+        halves[:, i] = goals[:, i, 2] - top
+        top = goals[:, i, 2] + halves[:, i]
+    return halves

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigid_envs.tasks.hand import Hand
-from rigid_envs.tasks.throw import GRAVITY, RADIUS, Throw
+from rigid_envs.tasks.throw import GRAVITY, Throw
 
 Array = np.ndarray
 
@@ -19,7 +19,7 @@ OPEN, CLOSE = 1.0, -1.0
 def _miss(point: Array, motion: Array, goal: Array) -> Array:
     """Distance in m of a goal from where a ball with this motion lands."""
     rise = motion[:, 2]
-    height = np.maximum(point[:, 2] - RADIUS, 0.0)
+    height = np.maximum(point[:, 2] - goal[:, 2], 0.0)
     flight = (rise + np.sqrt(rise**2 + 2.0 * GRAVITY * height)) / GRAVITY
     lands = point[:, :2] + flight[:, None] * motion[:, :2]
     return np.sqrt(np.sum((goal[:, :2] - lands) ** 2, axis=1))
@@ -29,7 +29,7 @@ def _launch(point: Array, goal: Array) -> Array:
     """Velocity in m/s, at the rise of the swing, that takes a ball from a point to the goal."""
     way = (goal - point)[:, :2]
     far = np.sqrt(np.sum(way**2, axis=1, keepdims=True))
-    drop = np.maximum(point[:, 2:] - RADIUS + far * np.tan(_RISE), 0.05)
+    drop = np.maximum(point[:, 2:] - goal[:, 2:] + far * np.tan(_RISE), 0.05)
     level = far * np.sqrt(0.5 * GRAVITY / drop)
     return np.concatenate([level * way / far, level * np.tan(_RISE)], axis=1)
 
@@ -41,7 +41,8 @@ def throw(observation: dict[str, Array]) -> Array:
     first = len(Hand.bounds)
     hand, velocity, reference = values[:, 0:3], values[:, 3:6], values[:, 8:11]
     ball, speed = values[:, first : first + 3], values[:, first + 3 : first + 6]
-    held = (np.abs(ball - hand).max(axis=1) < 1.5 * RADIUS) & (values[:, first + 9] == 0.0)
+    radius = goal[:, 2]  # at which a ball lies on the ground
+    held = (np.abs(ball - hand).max(axis=1) < 1.5 * radius) & (values[:, first + 9] == 0.0)
 
     swing = _launch(np.broadcast_to(_THROUGH, goal.shape), goal)
     ahead = swing / np.sqrt(np.sum(swing**2, axis=1, keepdims=True))
