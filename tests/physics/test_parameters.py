@@ -134,6 +134,7 @@ def test_scenes_with_bystanders_share_the_kernels_of_the_scene_of_everything(fid
     for scene in (
         scenes.block_on_ground(),
         Scene([Body(Sphere(0.02))], drives=[Drive(Capsule(0.01, 0.02), 0.1, 20.0)]),
+        Scene([Body(Box((0.02,) * 3))], drives=[Drive(Box((0.02,) * 3), 0.1, 20.0)]),
     ):
         assert (
             World(with_bystanders(scene), fidelity).features
