@@ -22,6 +22,7 @@ from physics import (
 from physics.reference import closed_forms, scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import CUBE, GRAVITY, settled
+from tests.physics.bystanders import with_bystanders
 
 BALL = Sphere(0.025)
 
@@ -499,7 +500,7 @@ def test_a_tool_of_any_shape_pushes_a_body_along(tool, shape, turn):
     """In free space, along x: both end with the speed of the tool, and nothing overlaps deeply."""
     body = Body(shape, mass=0.1, position=(0.06, 0.0, 0.0), material=Material(0.5, 0.0))
     drive = Drive(tool, 0.1, 20.0, (0.0, 0.0, 0.0), turn, material=Material(0.5, 0.0))
-    world = World(Scene([body], drives=[drive], gravity=(0.0, 0.0, 0.0)))
+    world = World(with_bystanders(Scene([body], drives=[drive], gravity=(0.0, 0.0, 0.0))))
     world.command_drives((0.2, 0.0, 0.0))
     for _ in range(25):
         world.advance(0.04)
@@ -537,7 +538,7 @@ def test_everything_comes_to_rest_on_every_kind_of_surface():
             x = 0.1 * (j - 1) if i == 0 else 2.0 * i
             if i == 0 or j == i:
                 bodies.append(Body(shape, mass=0.1, position=(x, 0.0, height), material=soft))
-    scene = Scene(bodies, [*statics, Ground(soft, -0.1)])
+    scene = with_bystanders(Scene(bodies, [*statics, Ground(soft, -0.1)]))
     world, two = World(scene), World(scene, count=2)
     for w in (world, two):
         w.advance(5.0)

@@ -110,17 +110,17 @@ def test_the_fingers_are_one_solid_across_the_grip(fidelity):
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_hit_on_one_finger_moves_both_as_one_mass(fidelity):
     """m v = (m + 2 M) u in the free flight of a servo that hardly pulls."""
-    fingers = Gripper(
-        Sphere(0.02), 0.1, 1e-6, 1e-6, distance=0.2, frequency=0.1, material=Material(0.0, 0.0)
-    )
+    smooth = Material(0.5, 0.0)  # it hits a face straight on, where friction has nothing to do
+    fingers = Gripper(CUBE, 0.1, 1e-6, 1e-6, distance=0.2, frequency=0.1, material=smooth)
     ball = Body(
         Sphere(0.02),
         mass=0.1,
         position=(-0.05, -0.1, 0.0),
         linear_velocity=(1.0, 0.0, 0.0),
-        material=Material(0.0, 0.0),
+        material=smooth,
     )
-    world = World(Scene([ball], drives=[fingers], gravity=(0.0, 0.0, 0.0)), fidelity)
+    # ground out of reach, for the kernels of the scenes above
+    world = World(Scene([ball], [Ground(height=-1.0)], [fingers], (0.0, 0.0, 0.0)), fidelity)
     world.advance(0.5)
     fingers, speed = world.drive_velocity[0, :, 0], world.linear_velocity[0, 0, 0]
     assert 0.1 * (speed + fingers.sum()) == pytest.approx(0.1, abs=1e-5)
@@ -129,10 +129,10 @@ def test_a_hit_on_one_finger_moves_both_as_one_mass(fidelity):
 
 def test_a_full_grip_leaves_the_carriage_its_force():
     """Both servos at their limits: the fingers close at one rate and move at the other."""
-    world = World(
-        Scene([], drives=[Gripper(CUBE, 0.5, 4.0, 1.0, distance=1.0, frequency=100.0)]),
-        Fidelity(),
-    )
+    hand = Gripper(CUBE, 0.5, 4.0, 1.0, distance=1.0, frequency=100.0)
+    # a cube and ground out of reach, for the kernels of the scenes above
+    bystander = Body(CUBE, mass=0.1, position=(5.0, 0.0, -0.98))
+    world = World(Scene([bystander], [Ground(height=-1.0)], [hand]), Fidelity())
     world.move_drives([[[0.0, 10.0, 5.0], [0.0, 10.0, 5.0]]], 0.1)
     world.advance(0.1)
     middle = world.drive_velocity[0].mean(axis=0)

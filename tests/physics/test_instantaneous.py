@@ -25,8 +25,8 @@ STEP = PRESETS["solid"].substep
 PHASES = 40
 
 
-def ball(restitution, speed, height=0.03, friction=0.0, **other):
-    """A ball of 2 cm that falls on the ground."""
+def ball(restitution, speed, height=0.03, friction=0.5, **other):
+    """A ball of 2 cm that falls straight on the ground, where friction has nothing to do."""
     return scenes.sphere_on_ground(
         friction=friction, restitution=restitution, position=(0, 0, height),
         linear_velocity=(0, 0, -speed), **other,
