@@ -37,10 +37,10 @@ def _hash_sources() -> int:
 
 SOURCES: int = _hash_sources()
 
-# Worlds that a kernel works on side by side, one to a vector lane. Sixteen are two vectors of AVX-512
-# or four of AVX2. LLVM checks before every run of a loop that its arrays don't overlap, and thinks
-# one of fewer turns too short to be worth it; and vectors that don't wait for each other hide how
-# long a root or a division takes
+# Worlds that a kernel works on side by side, one to a vector lane. Sixteen are two vectors of
+# AVX-512 or four of AVX2. LLVM checks before every run of a loop that its arrays don't overlap,
+# and thinks one of fewer turns too short to be worth it; and vectors that don't wait for each
+# other hide how long a root or a division takes
 LANES = 16
 
 # Without reference counts: numba would count all arrays of a model and a state up and down, with
