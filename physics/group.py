@@ -17,7 +17,8 @@ from physics.model import Model
 
 Array = np.ndarray
 
-# one row a solid: movers, then statics; what the stages read and write in a substep
+# one row a solid: movers, statics, and parts of compounds, of which the stages know only where they
+# are and how they move; what the stages read and write in a substep
 SOLID = np.dtype(
     [
         ("position", "f8", (3, LANES)),  # m
@@ -135,7 +136,7 @@ class Work(NamedTuple):
     """Working arrays of one call of a kernel, shared by no two threads.
 
     Attributes:
-        solid: [solids] of SOLID.
+        solid: [solids and parts] of SOLID.
         relative: [2] of SOLID: the owner of a side, in the frame of the surface that it meets;
             and while a pair is searched, the other way round.
         side: [sides] of MEETING.
@@ -162,7 +163,7 @@ class Work(NamedTuple):
         solids = len(model.mover) + len(model.static)
         slots = int(model.side["slot_count"].sum())
         return cls(
-            solid=aligned_zeros(solids, SOLID),
+            solid=aligned_zeros(solids + len(model.part), SOLID),
             relative=aligned_zeros(2, SOLID),
             side=aligned_zeros(len(model.side), MEETING),
             lane=aligned_zeros(1, LANE),
@@ -181,7 +182,7 @@ def make_constants(features: Features):
     @stage
     def constants(model, g):
         if varied:
-            return Model(model.mover[g], model.side[g], model.static, model.sample)
+            return Model(model.mover[g], model.side[g], model.part[g], model.static, model.sample)
         return model
 
     return constants
