@@ -246,8 +246,10 @@ class Compound:
             groups.setdefault((inset.radius, inset.sharp), []).append(kept)
         found = []
         for (radius, sharp), blocks in groups.items():
-            rows = _joined(np.concatenate(blocks), same)
-            found.append(Samples(rows[:, :3], rows[:, 3], radius, sharp))
+            rows = np.concatenate(blocks)
+            if len(rows):
+                rows = _joined(rows, same)
+                found.append(Samples(rows[:, :3], rows[:, 3], radius, sharp))
         heaviest = _heaviest_side(found, same)
         return tuple(group._replace(weights=group.weights / heaviest) for group in found)
 
@@ -326,7 +328,7 @@ def _joined(rows: Array, same: float) -> Array:
     edges = rows[:, 4:]
     apart = np.sqrt(np.sum((edges[:, None] - edges) ** 2, axis=2))
     first = np.argmax(apart <= same, axis=1)
-    return np.array([rows[first == k].mean(axis=0) for k in np.unique(first)]).reshape(-1, 7)
+    return np.array([rows[first == k].mean(axis=0) for k in np.unique(first)])
 
 
 def _heaviest_side(groups: list[Samples], same: float) -> float:

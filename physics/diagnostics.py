@@ -124,9 +124,10 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
     place = np.arange(len(side)) - model.side["first_slot"][side]
     overlap = rows["overlap"][:, world % LANES]
     meets = overlap > 0.0
+    seen = rows["weight"][:, world % LANES] > 0.0  # what a compound's other part hides isn't
     if "blow" in (state.candidate.dtype.names or ()):  # an impulse may come up to half a step early
         meets |= state.candidate["blow"][world // LANES, :, :, world % LANES].any(axis=-1)
-    touching = (place < state.side["count"][world, side]) & meets
+    touching = (place < state.side["count"][world, side]) & meets & seen
     touching &= state.world["diverged"][world] == 0
     return side[touching], np.flatnonzero(touching)
 

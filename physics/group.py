@@ -182,7 +182,8 @@ def make_constants(features: Features):
     @stage
     def constants(model, g):
         if varied:
-            return Model(model.mover[g], model.side[g], model.part[g], model.static, model.sample)
+            mover, side, part = model.mover[g], model.side[g], model.part[g]
+            return Model(mover, side, part, model.cover, model.static, model.sample)
         return model
 
     return constants

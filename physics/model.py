@@ -19,6 +19,7 @@ from physics.jit import LANES, aligned_zeros
 from physics.layout import Layout
 from physics.parameters import Parameters
 from physics.scene import NO_TURN, Body, Ground, Scene
+from physics.seams import Cover, covers
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Samples, Sphere
 
 Array = np.ndarray
@@ -89,6 +90,20 @@ PART = np.dtype(
         ("solid", "i8"),  # that it belongs to
         ("position", "f8", (3,)),  # m, of its centre in that solid's frame
         ("rotation", "f8", (9,)),  # matrix, row by row: its own frame to that solid's
+        ("first_cover", "i8"),  # into Model.cover
+        ("cover_count", "i8"),
+    ],
+    align=True,
+)
+
+# one row a rectangle of a part's face that another hides, see `seams.Cover`
+COVER = np.dtype(
+    [
+        ("axis", "i8"),
+        ("sign", "f8"),
+        ("face", "f8"),  # m at size 1, as the others
+        ("low", "f8", (2,)),
+        ("high", "f8", (2,)),
     ],
     align=True,
 )
@@ -128,6 +143,7 @@ class Model(NamedTuple):
         mover: [m] of MOVER; of varied worlds [groups, m], with a value a lane of MOVER_VARIES.
         side: [k] of SIDE; of varied worlds [groups, k], with a value a lane of SIDE_VARIES.
         part: [q] of PART; of varied worlds [groups, q], with a value a lane of PART_VARIES.
+        cover: [c] of COVER.
         static: [s, 7] position m and quaternion x y z w of the statics.
         sample: [p, 4] x y z in m in the owner's frame at size 1, and weight.
     """
@@ -135,6 +151,7 @@ class Model(NamedTuple):
     mover: Array
     side: Array
     part: Array
+    cover: Array
     static: Array
     sample: Array
 
@@ -188,7 +205,11 @@ def build(scene: Scene, fidelity: Fidelity, varied: bool = False) -> tuple[Model
     """
     layout = Layout.of(scene, fidelity)
     own = Parameters.of(scene)
-    movers, parts, (sides, samples) = _mover_rows(scene), _part_rows(layout), _side_rows(layout)
+    movers, (parts, hidden), (sides, samples) = (
+        _mover_rows(scene),
+        _part_rows(layout),
+        _side_rows(layout),
+    )
     for rows, columns in (
         (movers, of_movers(layout, own)),
         (sides, of_sides(layout, own)),
@@ -201,7 +222,7 @@ def build(scene: Scene, fidelity: Fidelity, varied: bool = False) -> tuple[Model
         for s in scene.statics
     ]
     static = np.array(poses, dtype=float).reshape(-1, 7)
-    model = Model(movers, sides, parts, static, samples)
+    model = Model(movers, sides, parts, hidden, static, samples)
     return model, _features(scene, fidelity, model, varied)
 
 
@@ -249,12 +270,19 @@ def _mover_rows(scene: Scene) -> Array:
     return rows
 
 
-def _part_rows(layout: Layout) -> Array:
-    """All rows of PART: what doesn't follow from parameters."""
+def _part_rows(layout: Layout) -> tuple[Array, Array]:
+    """All rows of PART: what doesn't follow from parameters; and those of COVER."""
     rows = np.zeros(len(layout.parts), dtype=PART)
-    for row, (solid, part) in zip(rows, layout.parts, strict=True):
-        row["solid"], row["rotation"] = solid, part.rotation.ravel()
-    return rows
+    hidden: list[Cover] = []
+    for solid in dict.fromkeys(solid for solid, _ in layout.parts):
+        parts = [part for owner, part in layout.parts if owner == solid]
+        own = rows[[owner == solid for owner, _ in layout.parts]]
+        for row, part, some in zip(own, parts, covers(parts), strict=True):
+            row["solid"], row["rotation"] = solid, part.rotation.ravel()
+            row["first_cover"], row["cover_count"] = len(hidden), len(some)
+            hidden += some
+        rows[[owner == solid for owner, _ in layout.parts]] = own
+    return rows, np.array([tuple(cover) for cover in hidden], dtype=COVER)
 
 
 def _side_rows(layout: Layout) -> tuple[Array, Array]:

@@ -16,8 +16,9 @@ from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
+from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
-from physics.stages.touch import make_touch
+from physics.stages.touch import HIDDEN, make_touch
 
 # one row a slot: what a report tells of the candidates there
 REPORT = np.dtype(
@@ -42,7 +43,8 @@ def make_loop(features, kind, report):
     friction = features.friction and not viscous
     normal_force = dashpot_force if features.dashpot else overlap_force
     plane, box = kind == PLANE, kind == BOX
-    touch = make_touch(kind)
+    compound = features.compound
+    touch = make_touch(kind, compound)
 
     @kernel
     def loop(slots, candidate, seen, constants, h, rows):
@@ -70,6 +72,8 @@ def make_loop(features, kind, report):
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
+                if box and compound:
+                    weight = 0.0 if face == HIDDEN else weight
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -231,6 +235,8 @@ def make_side(features, report):
             relative_motion(owner, frame, seen)
             if sphere and kind == SPHERE:
                 sphere_loop(slots, candidate, seen, constants, h, out)
+            if compound and box and kind == BOX:
+                hide(model, k, candidate, seen)
             if box and kind == BOX:
                 box_loop(slots, candidate, seen, constants, h, out)
             if capsule and kind == CAPSULE:

@@ -1,11 +1,14 @@
 """Parts of compounds: frames of their own, for the geometry of their surfaces.
 
-A part moves as its solid does, which alone has mass: forces and impulses act on that.
+A part moves as its solid does, which alone has mass: forces and impulses act on that. Where another
+part hides a face of a box, a sample that is over it is none of that box's business, and one within
+the box doesn't leave by it, see `physics.seams`.
 """
 
+import math
 from functools import cache
 
-from physics.jit import LANES, at, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.stages.kinematics import turned
 
 
@@ -48,3 +51,40 @@ def place_parts(model, work):
             spin[0, i] = omega[0, i]
             spin[1, i] = omega[1, i]
             spin[2, i] = omega[2, i]
+
+
+@kernel
+def hide(model, k, candidate, seen):
+    """Writes how far hidden faces of a box count as farther out, for a side's candidates.
+
+    By the box's least half extent for a sample within it, endlessly for one beyond the face.
+    """
+    side = model.side[k]
+    q = side.frame - model.mover.shape[0] - model.static.shape[0]
+    if q < 0 or model.part[q].cover_count == 0:
+        return
+    R, c, core, sizes = seen.rotation, seen.position, side.core, side.surface_size
+    first, count = model.part[q].first_cover, model.part[q].cover_count
+    for n in range(candidate.shape[0]):
+        row = candidate[n]
+        for axis in range(3):
+            for i in range(LANES):
+                row.cover[axis, i] = 0.0
+        for s in range(first, first + count):
+            cover = model.cover[s]
+            axis, sign, face = cover.axis, cover.sign, cover.face
+            second, third = (axis + 1) % 3, (axis + 2) % 3
+            for i in range(LANES):
+                x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
+                p, u, v = (
+                    R[3 * axis, i] * x + R[3 * axis + 1, i] * y + R[3 * axis + 2, i] * z,
+                    R[3 * second, i] * x + R[3 * second + 1, i] * y + R[3 * second + 2, i] * z,
+                    R[3 * third, i] * x + R[3 * third + 1, i] * y + R[3 * third + 2, i] * z,
+                )
+                p, u, v = sign * (p + c[axis, i]), u + c[second, i], v + c[third, i]
+                size = at(sizes, i)
+                over = (p > 0.0) & (u >= size * cover.low[0]) & (u <= size * cover.high[0])
+                over = over & (v >= size * cover.low[1]) & (v <= size * cover.high[1])
+                least = min(at(core[0], i), min(at(core[1], i), at(core[2], i)))
+                far = math.inf if p > size * face else least
+                row.cover[axis, i] = max(row.cover[axis, i], far) if over else row.cover[axis, i]

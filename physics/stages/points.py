@@ -10,8 +10,9 @@ from functools import cache
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.kinematics import turned
+from physics.stages.parts import hide
 from physics.stages.relative import relative_pose
-from physics.stages.touch import make_touch
+from physics.stages.touch import HIDDEN, make_touch
 
 
 @stage
@@ -159,8 +160,8 @@ def ends(model, work, k):
 def make_place(features, kind):
     """Kernel that writes the points of a side against one kind of surface."""
     friction, resistance = features.friction, features.resistance
-    touch = make_touch(kind)
     box, compound = kind == BOX, features.compound
+    touch = make_touch(kind, compound)
 
     @kernel
     def place(slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, points):
@@ -182,6 +183,8 @@ def make_place(features, kind):
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
                 weight = row.weight[i]
+                if box and compound:
+                    weight = 0.0 if face == HIDDEN else weight
                 ax, ay, az = turned(G, i, x, y, z)
                 nx, ny, nz = turned(G, i, nx, ny, nz)
                 bx, by, bz = (
@@ -274,6 +277,8 @@ def make_points(features):
             place_sphere(
                 slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out
             )
+        if compound and box and kind == BOX:
+            hide(model, k, candidate, seen)
         if box and kind == BOX:
             place_box(slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out)
         if capsule and kind == CAPSULE:
