@@ -1,5 +1,6 @@
 """A rigid-body engine: bodies sampled by particles, thousands of worlds at once, by numba."""
 
+from physics.compound import Compound, Part
 from physics.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged
 from physics.features import Features
@@ -15,6 +16,7 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "Compound",
     "ContactOverflow",
     "Contacts",
     "Drive",
@@ -24,6 +26,7 @@ __all__ = [
     "Ground",
     "Material",
     "Parameters",
+    "Part",
     "Readout",
     "Scene",
     "SimulationDiverged",

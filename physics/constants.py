@@ -110,6 +110,11 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
     moving = np.where(np.arange(len(solids)) < layout.movers, widths, np.inf)
     reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
+    # of a compound's part, about its own centre
+    surface_reach = reach[:, b]
+    for k, side in enumerate(sides):
+        if side.part >= 0:
+            surface_reach[:, k] = layout.parts[side.part][1].shape.reach * size[:, side.other]
     # of a wide face few samples lie where a narrow one touches it, so the narrow one's bear the
     # more: half and half of equal ones. Which of its faces a solid touches with isn't known: it
     # counts as the cube of its volume
@@ -128,7 +133,7 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "owner_radius": sampled * size[:, a],
         "radius": sampled * size[:, a] + rounded * size[:, b],
         "owner_reach": reach[:, a],
-        "surface_reach": reach[:, b],
+        "surface_reach": surface_reach,
         "owner_size": size[:, a],
         "surface_size": size[:, b],
         "share": np.where(shared, other / (own + other), 1.0),
@@ -146,3 +151,11 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
         "twist_damping": np.where(turns, twist_damping, 0.0),
     }
+
+
+def of_parts(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, parts, ...] of PART, by name."""
+    owners = np.array([solid for solid, _ in layout.parts], dtype=int)
+    places = np.array([part.position for _, part in layout.parts]).reshape(-1, 3)
+    size = _of_solids(p.size, [1.0] * (len(layout.solids) - layout.bodies))
+    return {"position": size[:, owners, None] * places}

@@ -15,6 +15,7 @@ from physics.rotation import rotation_matrix
 from physics.shapes import PLANE
 from physics.stages.contacts import REPORT, make_side
 from physics.stages.kinematics import make_kinematics, place_statics, place_tools
+from physics.stages.parts import make_parts
 from physics.stages.points import make_points
 from physics.state import FIRST_POSITION, FIRST_TOUCH, PRESSED, State
 
@@ -67,6 +68,7 @@ def _make_report(features: Features) -> Any:
     """Entry point that evaluates every candidate of a group of worlds at its present state."""
     sources = SOURCES
     constants, kinematics = make_constants(features), make_kinematics(features)
+    parts = make_parts(features)
     impulse = features.impulse
     side = make_points(features) if impulse else make_side(features, True)
 
@@ -78,6 +80,7 @@ def _make_report(features: Features) -> Any:
         load(model, state, work, chosen, 0)
         place_tools(model, work)
         kinematics(model, work)
+        parts(model, work)
         for k in range(model.side.shape[0]):
             if work.side[k].slots > 0:
                 if impulse:
@@ -122,9 +125,10 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
     place = np.arange(len(side)) - model.side["first_slot"][side]
     overlap = rows["overlap"][:, world % LANES]
     meets = overlap > 0.0
+    seen = rows["weight"][:, world % LANES] > 0.0  # what a compound's other part hides isn't
     if "blow" in (state.candidate.dtype.names or ()):  # an impulse may come up to half a step early
         meets |= state.candidate["blow"][world // LANES, :, :, world % LANES].any(axis=-1)
-    touching = (place < state.side["count"][world, side]) & meets
+    touching = (place < state.side["count"][world, side]) & meets & seen
     touching &= state.world["diverged"][world] == 0
     return side[touching], np.flatnonzero(touching)
 
@@ -138,22 +142,26 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
     statics, mover = model.static, state.mover[world]
     centers = np.concatenate([mover["position"], statics[:, :3]])
     turns = rotation_matrix(np.concatenate([mover["orientation"], statics[:, 3:]]))
-    surface = model.side["surface"][side]
+    # a part of a compound has a frame of its own
+    at, place = model.part["solid"], model.part["position"]
+    centers = np.concatenate([centers, centers[at] + np.einsum("nij,nj->ni", turns[at], place)])
+    turns = np.concatenate([turns, turns[at] @ model.part["rotation"].reshape(-1, 3, 3)])
+    surface, frame = model.side["surface"][side], model.side["frame"][side]
     in_place = features.impulse | (model.side["kind"][side] == PLANE)[:, None]  # a plane is too
-    origin = centers[model.side["owner"][side]] if features.impulse else centers[surface]
+    origin = centers[model.side["owner"][side]] if features.impulse else centers[frame]
     if not features.impulse:
         origin = np.where(in_place, 0.0, origin)
 
-    def turned(vectors: Array) -> Array:
-        return np.einsum("nij,nj->ni", turns[surface], vectors)
+    def turned(vectors: Array, by: Array) -> Array:
+        return np.einsum("nij,nj->ni", turns[by], vectors)
 
     def in_world(name: str) -> Array:
         vectors = rows[name][slot, :, lane]
-        return np.where(in_place, vectors, turned(vectors))
+        return np.where(in_place, vectors, turned(vectors, frame))
 
     force = in_world("force")
     if features.impulse:
-        force = force + turned(state.candidate["blow"][world // LANES, slot, :, lane])
+        force = force + turned(state.candidate["blow"][world // LANES, slot, :, lane], surface)
     return Report(
         side=side,
         overlap=rows["overlap"][slot, lane],
@@ -212,18 +220,26 @@ def between(model: Model, first: int, second: int) -> Array:
     return np.asarray((ends == sorted((first, second))).all(axis=-1))
 
 
-def samples(model: Model, solid: int) -> tuple[Array, float]:
-    """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m."""
+def samples(model: Model, solid: int) -> tuple[Array, float | Array]:
+    """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m.
+
+    Of a compound whose samples differ in it, their radii [n].
+    """
     side = model.side
-    for at, first, count in (
-        ("owner", "first_sample", "sample_count"),
-        ("surface", "first_partner", "partner_count"),
+    for at, other, first, count in (
+        ("owner", "surface", "first_sample", "sample_count"),
+        ("surface", "owner", "first_partner", "partner_count"),
     ):
-        # the same points meet every other solid
-        for row in side[(side[at] == solid) & (side[count] > 0)][:1]:
-            points = model.sample[row[first] : row[first] + row[count], :3]
-            both = float(row["radius"]), float(row["owner_radius"])
-            return points.copy(), both[1] if at == "owner" else both[0] - both[1]
+        rows = side[(side[at] == solid) & (side[count] > 0)]
+        if not len(rows):
+            continue
+        # the same points meet every other solid, and every part of it
+        rows = rows[(rows[other] == rows[other][0]) & (rows["frame"] == rows["frame"][0])]
+        points = [model.sample[row[first] : row[first] + row[count], :3] for row in rows]
+        radii = rows["owner_radius"] if at == "owner" else rows["radius"] - rows["owner_radius"]
+        if len(rows) == 1:
+            return points[0].copy(), float(radii[0])
+        return np.concatenate(points), np.repeat(radii, rows[count])
     return np.zeros((0, 3)), 0.0
 
 

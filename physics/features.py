@@ -22,6 +22,7 @@ class Features(NamedTuple):
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         drives: there are driven tools.
         gripper: some of them are the fingers of grippers.
+        compound: some surfaces are those of a compound's parts, with frames of their own.
         varied: worlds have masses, materials and sizes of their own.
     """
 
@@ -38,4 +39,5 @@ class Features(NamedTuple):
     particles: bool
     drives: bool
     gripper: bool
+    compound: bool
     varied: bool

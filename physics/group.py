@@ -18,7 +18,8 @@ from physics.state import FIRST_POSITION, FIRST_TOUCH, PRESSED
 
 Array = np.ndarray
 
-# one row a solid: movers, then statics; what the stages read and write in a substep
+# one row a solid: movers, statics, and parts of compounds, of which the stages know only where they
+# are and how they move; what the stages read and write in a substep
 SOLID = np.dtype(
     [
         ("position", "f8", (3, LANES)),  # m
@@ -139,7 +140,7 @@ class Work(NamedTuple):
     """Working arrays of one call of a kernel, shared by no two threads.
 
     Attributes:
-        solid: [solids] of SOLID.
+        solid: [solids and parts] of SOLID.
         relative: [2] of SOLID: the owner of a side, in the frame of the surface that it meets;
             and while a pair is searched, the other way round.
         side: [sides] of MEETING.
@@ -166,7 +167,7 @@ class Work(NamedTuple):
         solids = len(model.mover) + len(model.static)
         slots = int(model.side["slot_count"].sum())
         return cls(
-            solid=aligned_zeros(solids, SOLID),
+            solid=aligned_zeros(solids + len(model.part), SOLID),
             relative=aligned_zeros(2, SOLID),
             side=aligned_zeros(len(model.side), MEETING),
             lane=aligned_zeros(1, LANE),
@@ -185,7 +186,8 @@ def make_constants(features: Features):
     @stage
     def constants(model, g):
         if varied:
-            return Model(model.mover[g], model.side[g], model.static, model.sample)
+            mover, side, part = model.mover[g], model.side[g], model.part[g]
+            return Model(mover, side, part, model.cover, model.static, model.sample)
         return model
 
     return constants

@@ -17,14 +17,15 @@ def point_jacobian(arm: Array) -> Array:
 
 def landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
     """Shares [6, 6] of unit stiffness along and across the normal, on each of the six sides."""
-    positions, weights, radius = shape.samples(spacing, 0.0)
+    positions, weights, radius, _ = shape.samples(spacing, 0.0)
+    radii = np.broadcast_to(radius, len(weights))
     found = []
     for normal in (*np.eye(3), *-np.eye(3)):
-        height = positions @ normal
+        height = positions @ normal - radii
         lowest = height <= height.min() + 1e-9
         along, across = np.zeros((6, 6)), np.zeros((6, 6))
-        for position, weight in zip(positions[lowest], weights[lowest], strict=True):
-            jacobian = point_jacobian(position - radius * normal)
+        for k in np.flatnonzero(lowest):
+            jacobian, weight = point_jacobian(positions[k] - radii[k] * normal), weights[k]
             pressed = jacobian.T @ np.outer(normal, normal) @ jacobian
             along += weight * pressed
             across += weight * (jacobian.T @ jacobian - pressed)

@@ -8,18 +8,19 @@ both by `at`, and nothing of it remains in the code for worlds that are alike.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.constants import of_movers, of_sides
+from physics.constants import of_movers, of_parts, of_sides
 from physics.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.fidelity import Fidelity
 from physics.jit import LANES, aligned_zeros
 from physics.layout import Layout
 from physics.parameters import Parameters
 from physics.scene import NO_TURN, Body, Ground, Scene
-from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Box, Samples, Sphere
+from physics.seams import Cover, covers
+from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Samples, Sphere
 
 Array = np.ndarray
 # one row a mover: bodies, then drives. A drive has no inertia: it never turns
@@ -45,8 +46,10 @@ SIDE = np.dtype(
     [
         ("owner", "i8"),  # solid that carries the samples
         ("surface", "i8"),  # solid whose surface they meet
+        ("frame", "i8"),  # row of Work.solid in whose frame that surface lies
         ("kind", "i8"),  # of that surface
         ("mirror", "i8"),  # the side of the same pair the other way round, or -1
+        ("next", "i8"),  # the next side of the same pair, after the last the first
         ("first_sample", "i8"),  # into Model.sample
         ("sample_count", "i8"),
         ("first_partner", "i8"),  # likewise, the particles of a particle surface
@@ -81,6 +84,30 @@ SIDE = np.dtype(
     align=True,
 )
 
+# one row a part of a compound that has a surface of its own
+PART = np.dtype(
+    [
+        ("solid", "i8"),  # that it belongs to
+        ("position", "f8", (3,)),  # m, of its centre in that solid's frame
+        ("rotation", "f8", (9,)),  # matrix, row by row: its own frame to that solid's
+        ("first_cover", "i8"),  # into Model.cover
+        ("cover_count", "i8"),
+    ],
+    align=True,
+)
+
+# one row a rectangle of a part's face that another hides, see `seams.Cover`
+COVER = np.dtype(
+    [
+        ("axis", "i8"),
+        ("sign", "f8"),
+        ("face", "f8"),  # m at size 1, as the others
+        ("low", "f8", (2,)),
+        ("high", "f8", (2,)),
+    ],
+    align=True,
+)
+
 # what differs where worlds are varied
 MOVER_VARIES = ("core_reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
 SIDE_VARIES = (
@@ -106,6 +133,7 @@ SIDE_VARIES = (
     "twist_stiffness",
     "twist_damping",
 )
+PART_VARIES = ("position",)
 
 
 class Model(NamedTuple):
@@ -114,12 +142,16 @@ class Model(NamedTuple):
     Attributes:
         mover: [m] of MOVER; of varied worlds [groups, m], with a value a lane of MOVER_VARIES.
         side: [k] of SIDE; of varied worlds [groups, k], with a value a lane of SIDE_VARIES.
+        part: [q] of PART; of varied worlds [groups, q], with a value a lane of PART_VARIES.
+        cover: [c] of COVER.
         static: [s, 7] position m and quaternion x y z w of the statics.
         sample: [p, 4] x y z in m in the owner's frame at size 1, and weight.
     """
 
     mover: Array
     side: Array
+    part: Array
+    cover: Array
     static: Array
     sample: Array
 
@@ -137,20 +169,21 @@ class Model(NamedTuple):
         for table, dtype, fields in (
             (self.mover, MOVER, MOVER_VARIES),
             (self.side, SIDE, SIDE_VARIES),
+            (self.part, PART, PART_VARIES),
         ):
             rows = np.zeros(table.shape[1], dtype=dtype)
             for name in dtype.names or ():
                 values = table[name][group]
                 rows[name] = values[..., lane] if name in fields else values
             tables.append(rows)
-        return self._replace(mover=tables[0], side=tables[1])
+        return self._replace(mover=tables[0], side=tables[1], part=tables[2])
 
     def of_group(self, group: int) -> "Model":
         """The model of one group of worlds, as the kernels take it."""
         if self.mover.ndim == 1:
             return self
         alone = slice(group, group + 1)
-        return self._replace(mover=self.mover[alone], side=self.side[alone])
+        return self._replace(mover=self.mover[alone], side=self.side[alone], part=self.part[alone])
 
 
 def _spread(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
@@ -172,8 +205,16 @@ def build(scene: Scene, fidelity: Fidelity, varied: bool = False) -> tuple[Model
     """
     layout = Layout.of(scene, fidelity)
     own = Parameters.of(scene)
-    movers, (sides, samples) = _mover_rows(scene), _side_rows(layout)
-    for rows, columns in ((movers, of_movers(layout, own)), (sides, of_sides(layout, own))):
+    movers, (parts, hidden), (sides, samples) = (
+        _mover_rows(scene),
+        _part_rows(layout),
+        _side_rows(layout),
+    )
+    for rows, columns in (
+        (movers, of_movers(layout, own)),
+        (sides, of_sides(layout, own)),
+        (parts, of_parts(layout, own)),
+    ):
         for name, values in columns.items():
             rows[name] = values[0]
     poses = [
@@ -181,25 +222,33 @@ def build(scene: Scene, fidelity: Fidelity, varied: bool = False) -> tuple[Model
         for s in scene.statics
     ]
     static = np.array(poses, dtype=float).reshape(-1, 7)
-    model = Model(movers, sides, static, samples)
+    model = Model(movers, sides, parts, hidden, static, samples)
     return model, _features(scene, fidelity, model, varied)
 
 
 def spread(model: Model, count: int) -> Model:
     """The same model with rows of its own for each group of `count` worlds, all still alike."""
     tables = []
-    for rows, fields in ((model.mover, MOVER_VARIES), (model.side, SIDE_VARIES)):
+    for rows, fields in (
+        (model.mover, MOVER_VARIES),
+        (model.side, SIDE_VARIES),
+        (model.part, PART_VARIES),
+    ):
         table = aligned_zeros((-(-count // LANES), len(rows)), _spread(rows.dtype, fields))
         for name in rows.dtype.names or ():
             table[name] = rows[name][..., None] if name in fields else rows[name]
         tables.append(table)
-    return model._replace(mover=tables[0], side=tables[1])
+    return model._replace(mover=tables[0], side=tables[1], part=tables[2])
 
 
 def vary(model: Model, layout: Layout, worlds: Array, p: Parameters) -> None:
     """Writes what follows from the parameters [n, bodies] of the worlds [n] into a spread model."""
     group, lane = np.divmod(worlds, LANES)
-    tables = (model.mover, of_movers(layout, p)), (model.side, of_sides(layout, p))
+    tables = (
+        (model.mover, of_movers(layout, p)),
+        (model.side, of_sides(layout, p)),
+        (model.part, of_parts(layout, p)),
+    )
     for table, columns in tables:
         for name, values in columns.items():
             table[name][group, ..., lane] = values
@@ -221,6 +270,21 @@ def _mover_rows(scene: Scene) -> Array:
     return rows
 
 
+def _part_rows(layout: Layout) -> tuple[Array, Array]:
+    """All rows of PART: what doesn't follow from parameters; and those of COVER."""
+    rows = np.zeros(len(layout.parts), dtype=PART)
+    hidden: list[Cover] = []
+    for solid in dict.fromkeys(solid for solid, _ in layout.parts):
+        parts = [part for owner, part in layout.parts if owner == solid]
+        own = rows[[owner == solid for owner, _ in layout.parts]]
+        for row, part, some in zip(own, parts, covers(parts), strict=True):
+            row["solid"], row["rotation"] = solid, part.rotation.ravel()
+            row["first_cover"], row["cover_count"] = len(hidden), len(some)
+            hidden += some
+        rows[[owner == solid for owner, _ in layout.parts]] = own
+    return rows, np.array([tuple(cover) for cover in hidden], dtype=COVER)
+
+
 def _side_rows(layout: Layout) -> tuple[Array, Array]:
     """All rows of SIDE: what doesn't follow from parameters; and the samples."""
     rows = np.zeros(len(layout.sides), dtype=SIDE)
@@ -232,18 +296,25 @@ def _side_rows(layout: Layout) -> tuple[Array, Array]:
         samples.append(np.column_stack([some.positions, some.weights]))
         return first, len(some.weights)
 
-    ways = {(side.owner, side.other): k for k, side in enumerate(layout.sides)}
+    pairs: dict[tuple[int, int], list[int]] = {}
+    for k, side in enumerate(layout.sides):
+        first, last = sorted((side.owner, side.other))
+        pairs.setdefault((first, last), []).append(k)
+    row: Any
+    for ends in pairs.values():
+        rows["next"][ends] = np.roll(ends, -1)
+        ways = {layout.sides[k].owner for k in ends}
+        rows["mirror"][ends] = ends[::-1] if len(ends) == len(ways) == 2 else -1
     for row, side in zip(rows, layout.sides, strict=True):
         a, b = layout.solids[side.owner], layout.solids[side.other]
         row["owner"], row["surface"], row["kind"] = side.owner, side.other, side.surface.kind
-        row["mirror"] = ways.get((side.other, side.owner), -1)
+        row["frame"] = side.other if side.part < 0 else len(layout.solids) + side.part
         row["first_sample"], row["sample_count"] = add(side.samples)
         if side.partners is not None:
             row["first_partner"], row["partner_count"] = add(side.partners)
         row["first_slot"], row["slot_count"] = slots, side.capacity
         slots += side.capacity
-        particles = layout.fidelity.geometry == "particle" and isinstance(a, Body)
-        row["sharp"] = not isinstance(a, Ground) and isinstance(a.shape, Box) and not particles
+        row["sharp"] = side.samples.sharp
         if isinstance(a, Body) or isinstance(b, Body):  # nothing else turns
             for name in ("rolling", "spinning"):
                 field = f"{name}_resistance"
@@ -287,5 +358,6 @@ def _features(scene: Scene, fidelity: Fidelity, model: Model, varied: bool) -> F
         particles=PARTICLES in kinds,
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
+        compound=len(model.part) > 0,
         varied=varied,
     )

@@ -12,6 +12,7 @@ from physics.stages.gravity import gravity
 from physics.stages.impulses import make_impulses
 from physics.stages.integrator import make_drift, make_kick
 from physics.stages.kinematics import make_kinematics
+from physics.stages.parts import make_parts
 
 
 @cache
@@ -40,6 +41,7 @@ def make_substep(features: Features):
     kick = make_kick(features)
     drift = make_drift(features)
     kinematics = make_kinematics(features)
+    parts = make_parts(features)
     candidates = make_candidates(features)
     forces = make_forces(features)
     # A spring's force is there at a look; impulses are those of the half kick that comes first
@@ -52,6 +54,7 @@ def make_substep(features: Features):
             kick(model, work, 0.5 * h)
             drift(model, work, h)
         kinematics(model, work)
+        parts(model, work)
         candidates(model, state, work, g, opens)
         if look:
             forces(model, state, work, g, glance * h, 0.0, elapsed)

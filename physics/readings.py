@@ -168,10 +168,11 @@ class Readings:
             self._model, self._features, self._state, self._world_index(world)
         )
 
-    def samples(self, solid: int) -> tuple[Array, float]:
+    def samples(self, solid: int) -> tuple[Array, float | Array]:
         """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m.
 
-        A solid that others only touch with theirs, as the ground, has none.
+        Of a Compound whose samples differ in it, their radii [n]. A solid that others only touch
+        with theirs, as the ground, has none.
 
         Args:
             solid: its index, as in `first_touch`.

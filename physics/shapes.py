@@ -15,7 +15,7 @@ the other body, which has its own.
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -29,11 +29,19 @@ PLANE, SPHERE, BOX, CAPSULE, PARTICLES = range(5)
 
 
 class Samples(NamedTuple):
-    """Points that make contact: positions [n, 3] m in the body frame, weights [n], radius m."""
+    """Points that make contact.
+
+    Attributes:
+        positions: [n, 3] m in the body frame.
+        weights: [n].
+        radius: m, of all; or [n] of each.
+        sharp: whether they lie on a box's corners and edges, see `surfaces.box_distance`.
+    """
 
     positions: Array
     weights: Array
-    radius: float
+    radius: Any
+    sharp: bool = False
 
 
 class Surface(NamedTuple):
@@ -186,7 +194,7 @@ class Box:
                     points[:, (axis + 2) % 3] = v * core[(axis + 2) % 3]
                     positions.append(points)
                     weights.append(np.full(len(along), 1 / 8 / max(len(along), 1)))
-        return Samples(np.concatenate(positions), np.concatenate(weights), rounding)
+        return Samples(np.concatenate(positions), np.concatenate(weights), rounding, True)
 
     def particles(self, spacing: float) -> Samples:
         """A lattice of spheres over the surface; a face has weight 1 in sum if all are alike."""

@@ -16,6 +16,7 @@ in others they take turns: A is the mean.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -142,17 +143,22 @@ def _of_mover(
     """
     row = model.mover[i]
     inverse = np.diag([float(row["inverse_mass"])] * 3 + list(row["inverse_inertia"]))
-    partners: dict[int, list[Any]] = {}
+    # by the other solid and, as compounds meet through several sides either way, by their count
+    partners: dict[tuple[int, int], list[Any]] = {}
+    met: Counter[tuple[int, int]] = Counter()
     for side in model.side:
         ends = (int(side["owner"]), int(side["surface"]))
         if i in ends:
-            partners.setdefault(ends[0] if ends[1] == i else ends[1], []).append(side)
+            other = ends[0] if ends[1] == i else ends[1]
+            partners.setdefault((other, met[ends]), []).append(side)
+            met[ends] += 1
+    ways = {other: ((i, other) in met) + ((other, i) in met) for other, _ in partners}
 
     def load(h: float) -> float:
         each = []
-        for other, sides in partners.items():
+        for (other, _), sides in partners.items():
             # two solids that both carry samples share their stiffness between two sides
-            share = 1.0 / len(sides)
+            share = 1.0 / ways[other]
             if other < len(model.mover):
                 share *= 1.0 + model.mover[other]["inverse_mass"] / row["inverse_mass"]
             normal = share * sum(_normal(side, features.dashpot, h) for side in sides)

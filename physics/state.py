@@ -77,6 +77,9 @@ def candidate_dtype(features: Features) -> np.dtype:
         fields.append(("twist", "f8", (3, LANES)))
     if features.box:
         fields.append(("face", "f8", (LANES,)))  # by which it came into a box, see box_distance
+    if features.box and features.compound:
+        # m that a box's faces across each axis count as farther out, see stages/parts.py
+        fields.append(("cover", "f8", (3, LANES)))
     if features.particles:
         fields.append(("partner", "f8", (3, LANES)))  # m, particle of the surface
     return np.dtype(fields, align=True)

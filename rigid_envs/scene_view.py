@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from physics import Box, Gripper, Sphere, Static
+from physics import Box, Compound, Gripper, Part, Sphere, Static
+from physics.rotation import multiply, rotate
 from rigid_envs.runner import Runner
-from rigid_envs.view import BODY_COLORS, Arrow, Item, Particles, Sign
+from rigid_envs.view import BODY_COLORS, Arrow, Color, Item, Particles, Sign
 
 Array = np.ndarray
 
@@ -26,28 +27,46 @@ def items(runner: Runner, world: int, *, particles: bool = False) -> list[Item]:
     sizes = np.ones(len(scene.bodies))
     if engine.features.varied:
         sizes = engine.parameters.size[world]
-    found = [
-        Item(
-            body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i])),
-            engine.position[world, i],
-            engine.orientation[world, i],
-            BODY_COLORS[i % len(BODY_COLORS)],
-            _particles(runner, i, body.shape) if particles else None,
-        )
-        for i, body in enumerate(scene.bodies)
-    ]
+    found: list[Item] = []
+    for i, body in enumerate(scene.bodies):
+        shape = body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i]))
+        pose = engine.position[world, i], engine.orientation[world, i]
+        balls = _particles(runner, i, body.shape) if particles else None
+        found += _solid(shape, *pose, BODY_COLORS[i % len(BODY_COLORS)], balls)
     tools, first = engine.drive_position[world], len(scene.bodies)
     for i, drive in enumerate(scene.tools):
         balls = _particles(runner, first + i, drive.shape) if particles else None
-        found.append(Item(drive.shape, tools[i], np.array(drive.orientation), DRIVE_COLOR, balls))
+        found += _solid(drive.shape, tools[i], np.array(drive.orientation), DRIVE_COLOR, balls)
     for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
             pose = np.array(static.position), np.array(static.orientation)
             solid = first + len(scene.tools) + i
             balls = _particles(runner, solid, static.shape) if particles else None
-            found.append(Item(static.shape, *pose, STATIC_COLOR, balls))
+            found += _solid(static.shape, *pose, STATIC_COLOR, balls)
     for i, gripper in scene.grippers:
         found += _arm(gripper, tools[i], tools[i + 1])
+    return found
+
+
+def _solid(
+    shape: object, position: Array, orientation: Array, color: Color, balls: Particles | None
+) -> list[Item]:
+    """A solid as an item; a compound as one for each part, each with the balls nearest to it."""
+    if not isinstance(shape, Compound):
+        return [Item(shape, position, orientation, color, balls)]
+    found, nearest = [], np.zeros(0)
+    if balls is not None:
+        apart = [part.distance(balls.positions) for part in shape.parts]  # type: ignore[union-attr]
+        nearest = np.argmin(apart, axis=0)
+    for k, part in enumerate(shape.parts):
+        assert isinstance(part, Part)
+        own = None
+        if balls is not None:
+            mine, radius = nearest == k, np.broadcast_to(balls.radius, len(nearest))
+            own = Particles(part.inward(balls.positions[mine]), radius[mine])
+        place = position + rotate(orientation, np.array(part.position))
+        turn = multiply(orientation, np.array(part.orientation))
+        found.append(Item(part.shape, place, turn, color, own))
     return found
 
 

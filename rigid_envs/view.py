@@ -23,10 +23,10 @@ GOAL_COLOR = (46, 174, 96)
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Balls that stand for a solid: `positions` [n, 3] m in its frame, `radius` m of each."""
+    """Balls that stand for a solid: `positions` [n, 3] m in its frame, `radius` m, or [n]."""
 
     positions: Array
-    radius: float
+    radius: float | Array
 
 
 @dataclass(frozen=True, eq=False)

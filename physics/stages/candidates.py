@@ -162,7 +162,7 @@ def make_search(features):
                     if impulse:
                         note(
                             work.near[near + n],
-                            work.solid[side.surface],
+                            work.solid[side.frame],
                             i,
                             x,
                             y,
@@ -220,14 +220,15 @@ def make_side_search(features):
     """Kernel that searches a side in the lanes that need it."""
     search, clear = make_search(features)
     choose = make_choose(features, clear)
-    impulse = features.impulse
+    impulse, compound = features.impulse, features.compound
 
     @stage
     def look(work, side, seen):
         """Where a side's owner is, as seen from its surface; for a plane that is the world."""
         if side.kind == PLANE:
             return work.solid[side.owner]
-        relative_pose(work.solid[side.owner], work.solid[side.surface], seen)
+        frame = side.frame if compound else side.surface
+        relative_pose(work.solid[side.owner], work.solid[frame], seen)
         return seen
 
     @kernel

@@ -16,8 +16,9 @@ from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
 from physics.stages.normal_force import dashpot_force, overlap_force
+from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
-from physics.stages.touch import make_touch
+from physics.stages.touch import HIDDEN, make_touch
 
 # one row a slot: what a report tells of the candidates there
 REPORT = np.dtype(
@@ -42,7 +43,8 @@ def make_loop(features, kind, report):
     friction = features.friction and not viscous
     normal_force = dashpot_force if features.dashpot else overlap_force
     plane, box = kind == PLANE, kind == BOX
-    touch = make_touch(kind)
+    compound = features.compound
+    touch = make_touch(kind, compound)
 
     @kernel
     def loop(slots, candidate, seen, constants, h, rows):
@@ -70,6 +72,8 @@ def make_loop(features, kind, report):
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
+                if box and compound:
+                    weight = 0.0 if face == HIDDEN else weight
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -210,12 +214,15 @@ def make_side(features, report):
     capsule_loop = make_loop(features, CAPSULE, report)
     particle_loop = make_loop(features, PARTICLES, report)
     others = sphere or box or capsule or particles
+    compound = features.compound
+    begin_side = make_begin_side(features)
 
     @stage
     def side(model, state, work, rows, g, k, h):
         constants, meeting = model.side[k], work.side[k]
         kind, slots = constants.kind, meeting.slots
         owner, surface = work.solid[constants.owner], work.solid[constants.surface]
+        frame = work.solid[constants.frame] if compound else surface
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
@@ -224,46 +231,73 @@ def make_side(features, report):
         if plane and kind == PLANE:
             plane_loop(slots, candidate, owner, constants, h, out)
         if others and kind != PLANE:
-            relative_pose(owner, surface, seen)
-            relative_motion(owner, surface, seen)
+            relative_pose(owner, frame, seen)
+            relative_motion(owner, frame, seen)
             if sphere and kind == SPHERE:
                 sphere_loop(slots, candidate, seen, constants, h, out)
+            if compound and box and kind == BOX:
+                hide(model, k, candidate, seen)
             if box and kind == BOX:
                 box_loop(slots, candidate, seen, constants, h, out)
             if capsule and kind == CAPSULE:
                 capsule_loop(slots, candidate, seen, constants, h, out)
             if particles and kind == PARTICLES:
                 particle_loop(slots, candidate, seen, constants, h, out)
-            add_wrenches(owner, surface, seen)
+            add_wrenches(owner, surface, frame, seen)
 
     return side
 
 
-@stage
-def begin_side(model, work, k, h, seen):
-    """Sets what the loop of a side reads of the group, and sums up.
+@cache
+def make_begin_side(features):
+    """Stage that sets what the loop of a side reads of the group, and sums up."""
+    compound = features.compound
 
-    Of a pair, the mass rate is m / (W h): W is the share of its stiffness that bore in the last
-    step. It is zero where nothing bore. A step of no length is a look, and a lane at rest has no
-    step: neither lasts. The loop finds all of this in `seen`, for LLVM compares the places of all
-    arrays in it with each other before every turn.
-    """
-    meeting, side, active = work.side[k], model.side[k], work.lane[0].active
-    other = work.side[max(side.mirror, 0)]
-    pair_mass = side.pair_mass
+    @stage
+    def begin_side(model, work, k, h, seen):
+        """Of a pair, the mass rate is m / (W h).
+
+        W is the share of its stiffness that bore in the last step. It is zero where nothing bore. A
+        step of no length is a look, and a lane at rest has no step: neither lasts. The loop finds
+        all of this in `seen`, for LLVM compares the places of all arrays in it with each other
+        before every turn.
+        """
+        meeting, side, active = work.side[k], model.side[k], work.lane[0].active
+        other = work.side[max(side.mirror, 0)]
+        pair_mass = side.pair_mass
+        if compound:
+            sum_bore(model, work, k, seen.bearing)
+        for i in range(LANES):
+            rate = at(pair_mass, i) / h if h > 0.0 else 0.0
+            if compound:
+                share = seen.bearing[i]
+            else:
+                share = meeting.bore[i] + (other.bore[i] if side.mirror >= 0 else 0.0)
+            seen.mass_rate[i] = rate / share if share > 0.0 else 0.0
+            seen.lasts[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
+            seen.bearing[i] = 0.0
+            seen.pressed[i] = 0.0
+
+    return begin_side
+
+
+@kernel
+def sum_bore(model, work, k, total):
+    """Sums what bore in the last step over all sides of a pair: those of compounds have several."""
     for i in range(LANES):
-        rate = at(pair_mass, i) / h if h > 0.0 else 0.0
-        share = meeting.bore[i] + (other.bore[i] if side.mirror >= 0 else 0.0)
-        seen.mass_rate[i] = rate / share if share > 0.0 else 0.0
-        seen.lasts[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
-        seen.bearing[i] = 0.0
-        seen.pressed[i] = 0.0
+        total[i] = work.side[k].bore[i]
+    other = model.side[k].next
+    while other != k:
+        bore = work.side[other].bore
+        for i in range(LANES):
+            total[i] += bore[i]
+        other = model.side[other].next
 
 
 @stage
-def add_wrenches(owner, surface, seen):
-    """Adds the wrench that the owner feels, as seen from the surface, to both solids."""
-    R, a, b = surface.rotation, owner.position, surface.position
+def add_wrenches(owner, surface, frame, seen):
+    """Adds the wrench that the owner feels, as seen from a frame of the surface, to both solids."""
+    R, a, b = frame.rotation, owner.position, surface.position
     f, t = seen.force, seen.torque
     F, T, G, U = owner.force, owner.torque, surface.force, surface.torque
     for i in range(LANES):

@@ -10,8 +10,9 @@ from functools import cache
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.kinematics import turned
+from physics.stages.parts import hide
 from physics.stages.relative import relative_pose
-from physics.stages.touch import make_touch
+from physics.stages.touch import HIDDEN, make_touch
 
 
 @stage
@@ -159,13 +160,17 @@ def ends(model, work, k):
 def make_place(features, kind):
     """Kernel that writes the points of a side against one kind of surface."""
     friction, resistance = features.friction, features.resistance
-    touch = make_touch(kind)
-    box = kind == BOX
+    box, compound = kind == BOX, features.compound
+    touch = make_touch(kind, compound)
 
     @kernel
-    def place(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, points):
-        """`h` is the time in s in which last step's impulses were given and this one's will be."""
+    def place(slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, points):
+        """`h` is the time in s in which last step's impulses were given and this one's will be.
+
+        `frame` is that of the surface's geometry; what a contact remembers is seen from its solid.
+        """
         R, c = seen.rotation, seen.position
+        G = frame.rotation if compound else surface.rotation
         Q, a, b = surface.rotation, owner.position, surface.position
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
         sharp, pair_mass = constants.sharp != 0, constants.pair_mass
@@ -178,8 +183,10 @@ def make_place(features, kind):
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
                 weight = row.weight[i]
-                ax, ay, az = turned(Q, i, x, y, z)
-                nx, ny, nz = turned(Q, i, nx, ny, nz)
+                if box and compound:
+                    weight = 0.0 if face == HIDDEN else weight
+                ax, ay, az = turned(G, i, x, y, z)
+                nx, ny, nz = turned(G, i, nx, ny, nz)
                 bx, by, bz = (
                     ax + (a[0, i] - b[0, i]),
                     ay + (a[1, i] - b[1, i]),
@@ -248,27 +255,39 @@ def make_points(features):
     place_plane, place_sphere = make_place(features, PLANE), make_place(features, SPHERE)
     place_box, place_capsule = make_place(features, BOX), make_place(features, CAPSULE)
     place_particles = make_place(features, PARTICLES)
+    compound = features.compound
 
     @stage
     def points(model, state, work, g, k, keeps, h):
         constants, slots = model.side[k], work.side[k].slots
         owner, surface = work.solid[constants.owner], work.solid[constants.surface]
+        frame = work.solid[constants.frame] if compound else surface
         A, B = work.tensor[constants.owner].entry, work.tensor[constants.surface].entry
         first, kind = constants.first_slot, constants.kind
         candidate = state.candidate[g, first : first + slots]
         out = work.point[first : first + slots]
         seen = owner if kind == PLANE else work.relative[0]
         if kind != PLANE:
-            relative_pose(owner, surface, seen)
+            relative_pose(owner, frame, seen)
         if plane and kind == PLANE:
-            place_plane(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, out)
+            place_plane(
+                slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out
+            )
         if sphere and kind == SPHERE:
-            place_sphere(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, out)
+            place_sphere(
+                slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out
+            )
+        if compound and box and kind == BOX:
+            hide(model, k, candidate, seen)
         if box and kind == BOX:
-            place_box(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, out)
+            place_box(slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out)
         if capsule and kind == CAPSULE:
-            place_capsule(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, out)
+            place_capsule(
+                slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out
+            )
         if particles and kind == PARTICLES:
-            place_particles(slots, candidate, seen, owner, surface, A, B, constants, keeps, h, out)
+            place_particles(
+                slots, candidate, seen, owner, surface, frame, A, B, constants, keeps, h, out
+            )
 
     return points

@@ -1,7 +1,8 @@
 """A side's geometry in the frame of its surface, where the surface is at rest.
 
 A row of SOLID holds it, with the owner's rotation, position, velocity and spin as seen from the
-surface; force and torque are then the owner's in that frame. The frame of a plane is the world's.
+surface; force and torque are then the owner's in that frame. The frame of a plane is the world's,
+and a compound's parts have one each.
 """
 
 from physics.jit import LANES, stage

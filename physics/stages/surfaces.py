@@ -34,7 +34,7 @@ def _pick(on_x, on_y, x, y, z):
 
 
 @stage
-def box_distance(x, y, z, a, b, c, face, radius, sharp):
+def box_distance(x, y, z, a, b, c, face, radius, sharp, wx=0.0, wy=0.0, wz=0.0):
     """From a box of half extents a, b, c; negative inside.
 
     A ball rolls over the box's edges: outside, the nearest point decides (`sharp` false). The
@@ -47,12 +47,16 @@ def box_distance(x, y, z, a, b, c, face, radius, sharp):
     Deeper than the rounding, the nearest face may be the wrong side of an edge. Without one, 0, a
     point inside leaves by the nearest.
 
+    `wx`, `wy` and `wz` are 0, or m that the faces across that axis are taken to be farther out: of
+    a compound's parts, others hide some, see `physics.seams`.
+
     Returns:
         distance m, normal x y z, and the face to remember.
     """
-    qx = abs(x) - a
-    qy = abs(y) - b
-    qz = abs(z) - c
+    hx = abs(x) - a
+    hy = abs(y) - b
+    hz = abs(z) - c
+    qx, qy, qz = hx - wx, hy - wy, hz - wz
     ox = max(qx, 0.0)
     oy = max(qy, 0.0)
     oz = max(qz, 0.0)
@@ -66,7 +70,7 @@ def box_distance(x, y, z, a, b, c, face, radius, sharp):
     over = sign * _pick(first, second, x, y, z) - _pick(first, second, a, b, c)
     beside = max(qy if first else qx, qy if axis == 3.0 else qz)
     lasting = (over < radius) & (beside < radius) if sharp else not outside
-    known = lasting & (face != 0.0)
+    known = lasting & (face != 0.0) & (_pick(first, second, wx, wy, wz) == 0.0)
 
     on_x = first if known else qx >= max(qy, qz)
     on_y = second if known else (not on_x) & (qy >= qz)
@@ -74,7 +78,7 @@ def box_distance(x, y, z, a, b, c, face, radius, sharp):
     ix = side if on_x else 0.0
     iy = side if on_y else 0.0
     iz = 0.0 if on_x | on_y else side
-    height = over if known else _pick(on_x, on_y, qx, qy, qz)
+    height = over if known else _pick(on_x, on_y, hx, hy, hz)
     beyond = max(qy if on_x else qx, qz if on_x | on_y else qy)
 
     round_off = outside & (not sharp)

@@ -3,16 +3,20 @@
 The contact point lies in the middle of the overlap, on the line from the sample along the normal.
 """
 
+import math
 from functools import cache
 
 from physics.jit import stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
 
+# a face of a box that no sample has, see `touch`
+HIDDEN = 9.0
+
 
 @cache
-def make_touch(kind):
-    """Formula for samples against one kind of surface."""
+def make_touch(kind, compound):
+    """Formula for samples against one kind of surface, in a scene with compounds or without."""
     plane, particles, box = kind == PLANE, kind == PARTICLES, kind == BOX
     surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
 
@@ -34,7 +38,8 @@ def make_touch(kind):
 
         Returns:
             Arm x y z in m from the owner's centre to the contact point, normal x y z out of the
-            surface, overlap in m (negative if apart), and the face of a box to remember, else 0.
+            surface, overlap in m (negative if apart), and the face of a box to remember, else 0;
+            HIDDEN where another part of a compound hides the face that the sample is over.
         """
         x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
         rx = R[0, i] * x + R[1, i] * y + R[2, i] * z
@@ -49,7 +54,13 @@ def make_touch(kind):
             px -= row.partner[0, i]
             py -= row.partner[1, i]
             pz -= row.partner[2, i]
-        if box:
+        if box and compound:
+            wx, wy, wz = row.cover[0, i], row.cover[1, i], row.cover[2, i]
+            distance, nx, ny, nz, face = box_distance(
+                px, py, pz, ca, cb, cc, row.face[i], radius, sharp, wx, wy, wz
+            )
+            face = HIDDEN if max(wx, max(wy, wz)) == math.inf else face
+        elif box:
             distance, nx, ny, nz, face = box_distance(
                 px, py, pz, ca, cb, cc, row.face[i], radius, sharp
             )

@@ -1,4 +1,4 @@
-"""Push: a finger on a carriage pushes a cube over the ground to a goal."""
+"""Push: a finger on a carriage pushes a block over the ground to a goal."""
 
 from collections.abc import Sequence
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from physics import (
     Body,
-    Box,
     Capsule,
+    Compound,
     Drive,
     Ground,
     Material,
@@ -20,12 +20,12 @@ from physics import (
 from physics.validation import instance, integer
 from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
+from rigid_envs.tasks.block import HALF, Block
 from rigid_envs.tasks.task import Task
 from rigid_envs.view import Goal, Sign
 
 Array = np.ndarray
 
-HALF = 0.02  # m, half the cube's width
 MASS = 0.1  # kg
 FINGER = 0.015  # m, radius
 HOME = (0.0, 0.0, 0.12)  # m, of the finger
@@ -45,9 +45,10 @@ CLEAR = 0.05
 
 
 class Push(Task):
-    """Cube and goal lie anywhere within 15 cm of the origin; solved within 5 cm of the goal.
+    """Block and goal lie anywhere within 15 cm of the origin; solved within 5 cm of the goal.
 
     Args:
+        block: what is pushed: "cube", "t", or a Compound as it is to lie on the ground.
         target_yaw: whether the goal asks for a yaw too, which counts as solved within 15 degrees.
         obstacles: number of posts that stand in the way, 0 to 4.
     """
@@ -68,12 +69,22 @@ class Push(Task):
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
     sizes = (0.0, 2.5)  # larger cubes would reach up to the finger at home
 
-    def __init__(self, target_yaw: bool = False, obstacles: int = 0) -> None:
+    def __init__(
+        self, target_yaw: bool = False, obstacles: int = 0, block: str | Compound = "cube"
+    ) -> None:
         """Adds what the options ask for to the goal and to the draws of a start."""
+        self.block = Block.of(block)
         self.target_yaw = bool(instance("target_yaw", target_yaw, bool))
         self.obstacles = integer("obstacles", obstacles, low=0)
         if self.obstacles > len(POSTS):
             raise ValueError(f"obstacles must be at most {len(POSTS)}, got {obstacles!r}")
+        if not self.block.cube:
+            if self.target_yaw:
+                raise ValueError(
+                    f"target_yaw=True asks for the yaw of a cube: leave it out with block={block!r}"
+                )
+            self.bounds = _of_block(Push.bounds)
+            self.goal_bounds = _of_block(Push.goal_bounds)
         if self.target_yaw:
             heading = tuple((f"cube heading {a}", "m", -2.0 * ARM, 2.0 * ARM) for a in "xy")
             self.goal_bounds = Push.goal_bounds + heading
@@ -82,7 +93,7 @@ class Push(Task):
             self.draws += 2 * TRIES
 
     def scene(self) -> Scene:
-        """A cube on the ground, a finger above it, and posts."""
+        """A block on the ground, a finger above it, and posts."""
         material = Material(friction=0.5, restitution=0.1)
         post = Capsule(POST_RADIUS, 0.5 * POST_HEIGHT - POST_RADIUS)
         posts = [
@@ -90,19 +101,26 @@ class Push(Task):
             for x, y in POSTS[: self.obstacles]
         ]
         return Scene(
-            bodies=[Body(Box((HALF,) * 3), mass=MASS, position=(0, 0, HALF), material=material)],
+            bodies=[
+                Body(
+                    self.block.shape,
+                    mass=MASS,
+                    position=(0, 0, self.block.height),
+                    material=material,
+                )
+            ],
             statics=[Ground(material=material), *posts],
             drives=[Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME)],
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
-        """Cube at a random place and yaw, finger at home, goal away from the cube.
+        """Block at a random place and yaw, finger at home, goal away from the block.
 
         Neither lies near a post.
         """
         n = len(draws)
         drawn, more = draws[:, : Push.draws], draws[:, Push.draws :]
-        height = np.full(n, HALF)
+        height = np.full(n, self.block.height)
         if world.features.varied:
             height *= world.parameters.size[mask, 0]
         position = np.zeros((n, 1, 3))
@@ -114,7 +132,7 @@ class Push(Task):
             places[:, 1:-1] = RANGE * (2.0 * more[:, : 2 * TRIES].reshape(n, TRIES, 2) - 1.0)
             clear = self._clear(places, height)
             position[:, 0, :2] = places[np.arange(n), np.argmax(clear, axis=1)]
-        half_yaw = np.pi / 4.0 * drawn[:, 2]  # a cube looks the same after a quarter turn
+        half_yaw = np.pi / self.block.turns * drawn[:, 2]  # more would look the same again
         orientation = np.zeros((n, 1, 4))
         orientation[:, 0, 2], orientation[:, 0, 3] = np.sin(half_yaw), np.cos(half_yaw)
         world.reset(mask)
@@ -135,9 +153,10 @@ class Push(Task):
         return np.concatenate([goal, heading], axis=1)
 
     def _clear(self, places: Array, height: Array) -> Array:
-        """Which places [n, tries, 2 or 3] of cubes of half a width [n] aren't near any post."""
+        """Which places [n, tries, 2 or 3] of blocks of so high a centre [n] aren't near a post."""
         clear = np.ones(places.shape[:2], dtype=bool)
-        least = POST_RADIUS + (CLEAR - POST_RADIUS) / HALF * height[:, None]
+        room = CLEAR - POST_RADIUS + (self.block.radius - np.sqrt(2.0) * HALF)
+        least = POST_RADIUS + room / self.block.height * height[:, None]
         for post in POSTS[: self.obstacles]:
             clear &= np.sum((places[:, :, :2] - post) ** 2, axis=2) > least**2
         return clear
@@ -156,7 +175,7 @@ class Push(Task):
         out[:, 19:22] = cube - finger
 
     def achieved(self, world: World, now: Readout) -> Array:
-        """Where the cube is, and its heading if the goal asks for a yaw."""
+        """Where the block is, and its heading if the goal asks for a yaw."""
         if not self.target_yaw:
             return now.position[:, 0]
         return np.concatenate([now.position[:, 0], heading(now.orientation[:, 0])], axis=1)
@@ -164,12 +183,13 @@ class Push(Task):
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
-        """`reach`: m, minus the finger's way to the cube's side that faces away from the goal."""
+        """`reach`: m, minus the finger's way to the block's side that faces away from the goal."""
         cube = achieved[:, :3]
         away = cube - desired[:, :3]
         if self.target_yaw:  # the goals' distance may be one of headings
             apart = np.sqrt(np.sum(away**2, axis=1))
-        ratio = (1.6 * HALF + FINGER) / np.maximum(apart, 1e-6)
+        beside = 1.6 * HALF if self.block.cube else self.block.radius
+        ratio = (beside + FINGER) / np.maximum(apart, 1e-6)
         behind = cube + away * ratio[:, None]
         return {"reach": -distance(now.position[:, 1], behind)}
 
@@ -182,6 +202,13 @@ class Push(Task):
             foot = goal[:3] * (1.0, 1.0, 0.0)
             shown += [Goal(foot + np.sqrt(2.0) * HALF * dot, 0.15 * HALF) for dot in dots]
         return shown
+
+
+def _of_block(
+    bounds: tuple[tuple[str, str, float, float], ...],
+) -> tuple[tuple[str, str, float, float], ...]:
+    """The bounds of a cube as those of another block."""
+    return tuple((name.replace("cube", "block"), *rest) for name, *rest in bounds)  # type: ignore[misc]
 
 
 def heading(orientation: Array) -> Array:

@@ -2,7 +2,11 @@
 
 import numpy as np
 
-from rigid_envs.tasks.push import FINGER, HALF, POST_RADIUS, POSTS, STRIDE
+from physics import Compound
+from physics.rotation import yaw as yaw_of
+from rigid_envs.tasks.block import HALF, Block
+from rigid_envs.tasks.push import FINGER, POST_RADIUS, POSTS, STRIDE
+from training.scripted.outline import by_outline, outline
 
 Array = np.ndarray
 
@@ -22,7 +26,9 @@ _REACHED = 0.043
 _LEVER, _GAIN = 0.011, 0.03
 
 
-def push(observation: dict[str, Array], obstacles: int = 0) -> Array:
+def push(
+    observation: dict[str, Array], obstacles: int = 0, block: str | Compound = "cube"
+) -> Array:
     """Goes over the cube to the side away from the goal, down, and pushes along the line.
 
     Each step is decided from the present alone: a finger that has slipped off the line rises and
@@ -31,7 +37,10 @@ def push(observation: dict[str, Array], obstacles: int = 0) -> Array:
     Args:
         observation: of Push with any options.
         obstacles: number of its posts, which the observation doesn't tell.
+        block: what is pushed, likewise.
     """
+    pushed = Block.of(block)
+    size = pushed.radius / (np.sqrt(2.0) * HALF)
     values = observation["observation"].astype(float)
     finger, cube = values[:, 0:3], values[:, 6:9]
     achieved, desired = (observation[f"{k}_goal"].astype(float) for k in ("achieved", "desired"))
@@ -39,8 +48,11 @@ def push(observation: dict[str, Array], obstacles: int = 0) -> Array:
     apart = np.sqrt(np.sum(to_goal**2, axis=1, keepdims=True))
     ahead = to_goal / np.maximum(apart, 1e-9)
     if obstacles:
-        ahead = _around(cube[:, :2], ahead, apart, POSTS[:obstacles])
-    if desired.shape[1] > 3:
+        ahead = _around(cube[:, :2], ahead, apart, POSTS[:obstacles], size)
+    if not pushed.cube:
+        yaw = yaw_of(values[:, 9:13])
+        target = by_outline(finger, cube, yaw, ahead, apart[:, 0], outline(pushed))
+    elif desired.shape[1] > 3:
         yaw, wanted = (0.25 * np.arctan2(goal[:, 4], goal[:, 3]) for goal in (achieved, desired))
         target = _by_faces(finger, cube, yaw, wanted, ahead, apart[:, 0], POSTS[:obstacles])
     else:
@@ -76,8 +88,12 @@ def _along(finger: Array, cube: Array, ahead: Array, apart: Array) -> Array:
     return target
 
 
-def _around(cube: Array, ahead: Array, apart: Array, posts: Array) -> Array:
-    """The direction [n, 2] nearest to `ahead` in which no post stands in the way."""
+def _around(cube: Array, ahead: Array, apart: Array, posts: Array, size: float) -> Array:
+    """The direction [n, 2] nearest to `ahead` in which no post stands in the way.
+
+    `size`: of the block, in cubes.
+    """
+    room, beyond = POST_RADIUS + size * (_ROOM - POST_RADIUS), size * (_BEHIND - FINGER) + FINGER
     turns = np.pi / 24.0 * np.arange(-24, 24)
     turned = np.stack([np.cos(turns), np.sin(turns)], axis=1)  # [turns, 2]
     across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
@@ -89,8 +105,8 @@ def _around(cube: Array, ahead: Array, apart: Array, posts: Array) -> Array:
         along = np.sum(ways * to_post[:, None], axis=2)
         nearest = np.clip(along, 0.0, np.minimum(apart, _AHEAD))[..., None] * ways
         passing = np.sqrt(np.sum((to_post[:, None] - nearest) ** 2, axis=2))
-        free &= passing >= np.minimum(_ROOM, now - 1e-9)
-        free &= _finger_fits(cube[:, None] - _BEHIND * ways, post)
+        free &= passing >= np.minimum(room, now - 1e-9)
+        free &= _finger_fits(cube[:, None] - beyond * ways, post)
     best = np.argmin(np.where(free, 0.0, 10.0) + np.abs(turns), axis=1)
     return ways[np.arange(len(ways)), best]
 
