@@ -6,10 +6,11 @@ world's numbers don't depend, to the last bit, on how many are worked out with t
 
 import numpy as np
 
+from physics.compound import Compound
 from physics.layout import Layout, leverage, pair_stiffness
 from physics.parameters import Parameters
 from physics.scene import Body, Drive, Ground
-from physics.shapes import PLANE
+from physics.shapes import PLANE, Shape
 from physics.stages.friction import tangential_coefficients
 from physics.stages.normal_force import damping_coefficients, rest_speed
 
@@ -49,8 +50,7 @@ def of_movers(layout: Layout, p: Parameters) -> Columns:
     weight[:, : layout.bodies] = p.mass[:, :, None] * layout.gravity + 0.0
     mass = [d.mass for d in drives if isinstance(d, Drive)]
     shapes = [s.shape for s in layout.solids[: layout.movers] if not isinstance(s, Ground)]
-    rounded = layout.fidelity.geometry == "shape"
-    core = [s.reach - (s.surface(0.0).radius if rounded else 0.0) for s in shapes]
+    core = [_core_reach(shape, layout.fidelity.geometry == "shape") for shape in shapes]
     return {
         "core_reach": _of_solids(p.size, [1.0] * len(drives)) * np.array(core),
         "inverse_mass": 1.0 / _of_solids(p.mass, mass),
@@ -151,6 +151,13 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
         "twist_damping": np.where(turns, twist_damping, 0.0),
     }
+
+
+def _core_reach(shape: Shape, rounded: bool) -> float:
+    """Farthest point in m from a shape's centre that turning moves: roundings turn in place."""
+    if isinstance(shape, Compound) or not rounded:
+        return shape.reach
+    return shape.reach - shape.surface(0.0).radius
 
 
 def of_parts(layout: Layout, p: Parameters) -> Columns:
