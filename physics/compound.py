@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,13 @@ def _directions(count: int) -> Array:
 
 
 _DIRECTIONS = _directions(200)
+
+
+class Group(NamedTuple):
+    """Samples of one radius, and whether they are `sharp`: a box's corners and edges."""
+
+    samples: Samples
+    sharp: bool
 
 
 @dataclass(frozen=True)
@@ -215,7 +222,7 @@ class Compound:
 
     def samples(self, spacing: float, rounding: float) -> Samples:
         """All of `groups` as one; their radii [n] where they differ."""
-        groups = self.groups(spacing, rounding)
+        groups = [group.samples for group in self.groups(spacing, rounding)]
         if len(groups) == 1:
             return groups[0]
         radii = [np.full(len(group.weights), group.radius) for group in groups]
@@ -225,7 +232,7 @@ class Compound:
             np.concatenate(radii),
         )
 
-    def groups(self, spacing: float, rounding: float) -> tuple[Samples, ...]:
+    def groups(self, spacing: float, rounding: float) -> tuple[Group, ...]:
         """Core samples of the parts, but those that others cover, by their radius.
 
         Args:
@@ -233,7 +240,7 @@ class Compound:
             rounding: m by which boxes are inset.
         """
         if self.only is not None:
-            return (self.only.samples(spacing, rounding),)
+            return (Group(self.only.samples(spacing, rounding), isinstance(self.only, Box)),)
         same = _SAME * self.width
         groups: dict[tuple[Any, bool], list[Array]] = {}
         for i, part in enumerate(self._parts):
@@ -243,15 +250,19 @@ class Compound:
             weights = part.shape.volume / self.volume * inset.weights
             rows = np.column_stack([part.outward(inset.positions), weights, edges])
             kept = rows[self._useful(i, edges, outer.radius)]
-            groups.setdefault((inset.radius, inset.sharp), []).append(kept)
+            sharp = isinstance(part.shape, Box)
+            groups.setdefault((inset.radius, sharp), []).append(kept)
         found = []
         for (radius, sharp), blocks in groups.items():
             rows = np.concatenate(blocks)
             if len(rows):
                 rows = _joined(rows, same)
-                found.append(Samples(rows[:, :3], rows[:, 3], radius, sharp))
-        heaviest = _heaviest_side(found, same)
-        return tuple(group._replace(weights=group.weights / heaviest) for group in found)
+                found.append(Group(Samples(rows[:, :3], rows[:, 3], radius), sharp))
+        heaviest = _heaviest_side([group.samples for group in found], same)
+        return tuple(
+            Group(samples._replace(weights=samples.weights / heaviest), sharp)
+            for samples, sharp in found
+        )
 
     def _useful(self, i: int, points: Array, radius: float | Array) -> Array:
         """Which samples [n] of part i, at points [n, 3] m, are no part of another."""

@@ -17,7 +17,7 @@ def point_jacobian(arm: Array) -> Array:
 
 def landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
     """Shares [6, 6] of unit stiffness along and across the normal, on each of the six sides."""
-    positions, weights, radius, _ = shape.samples(spacing, 0.0)
+    positions, weights, radius = shape.samples(spacing, 0.0)
     radii = np.broadcast_to(radius, len(weights))
     found = []
     for normal in (*np.eye(3), *-np.eye(3)):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compound import Compound, Part
+from physics.compound import Compound, Group, Part
 from physics.fidelity import Fidelity
 from physics.landing import fastest
 from physics.scene import Body, Drive, Ground, Material, Scene, Static
@@ -24,7 +24,8 @@ class Side(NamedTuple):
     """The samples of solid `owner` against the surface of solid `other`.
 
     With `shared`, both of a pair carry samples, and bear a part of its load each. A `part` is that
-    of `Layout.parts` whose surface it is, -1 where it is the solid's own.
+    of `Layout.parts` whose surface it is, -1 where it is the solid's own. Of `sharp`, see
+    `surfaces.box_distance`.
     """
 
     owner: int
@@ -34,6 +35,7 @@ class Side(NamedTuple):
     partners: Samples | None
     shared: bool = False
     part: int = -1
+    sharp: bool = False
 
     @property
     def capacity(self) -> int:
@@ -102,7 +104,7 @@ def leverage(solid: Solid) -> float:
     """See `tangential_coefficients`: of a box that lies on its widest face; balls don't rock."""
     shape = _plain(solid.shape) if isinstance(solid, Body) else None
     if isinstance(shape, Compound):
-        return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0)[:3])
+        return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0))
     if not isinstance(shape, Box):
         return 0.0
     height, *sides = sorted(shape.half_extents)
@@ -157,13 +159,13 @@ def _sides(scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
     def particles(solid: Body | Drive | Static) -> Samples:
         return solid.shape.particles(spacing(solid.shape, scene, fidelity))
 
-    def groups(solid: Body | Drive | Static) -> tuple[Samples, ...]:
+    def groups(solid: Body | Drive | Static) -> tuple[Group, ...]:
         if fidelity.geometry == "particle" and isinstance(solid, Body):
-            return (particles(solid),)
+            return (Group(particles(solid), False),)
         shape, apart = solid.shape, spacing(solid.shape, scene, fidelity)
         if isinstance(shape, Compound):
             return shape.groups(apart, rounding(solid))
-        return (shape.samples(apart, rounding(solid)),)
+        return (Group(shape.samples(apart, rounding(solid)), isinstance(shape, Box)),)
 
     def meetings(owner: int, other: int) -> list[Side]:
         """The samples of one solid against all surfaces of another."""
@@ -175,8 +177,8 @@ def _sides(scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
         if not surfaces:
             surfaces = [(-1, b.shape.surface(rounding(b)))]
         return [
-            Side(owner, other, some, surface, None, part=k)
-            for some in groups(a)
+            Side(owner, other, some, surface, None, part=k, sharp=sharp)
+            for some, sharp in groups(a)
             for k, surface in surfaces
         ]
 
@@ -191,8 +193,8 @@ def _sides(scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
-                for some in groups(a):
-                    yield Side(i, j, some, plane, None)
+                for some, sharp in groups(a):
+                    yield Side(i, j, some, plane, None, sharp=sharp)
                 continue
             bodies = isinstance(a, Body) and isinstance(b, Body)
             if fidelity.geometry == "particle" and bodies:

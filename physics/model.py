@@ -314,7 +314,7 @@ def _side_rows(layout: Layout) -> tuple[Array, Array]:
             row["first_partner"], row["partner_count"] = add(side.partners)
         row["first_slot"], row["slot_count"] = slots, side.capacity
         slots += side.capacity
-        row["sharp"] = side.samples.sharp
+        row["sharp"] = side.sharp
         if isinstance(a, Body) or isinstance(b, Body):  # nothing else turns
             for name in ("rolling", "spinning"):
                 field = f"{name}_resistance"

@@ -35,13 +35,11 @@ class Samples(NamedTuple):
         positions: [n, 3] m in the body frame.
         weights: [n].
         radius: m, of all; or [n] of each.
-        sharp: whether they lie on a box's corners and edges, see `surfaces.box_distance`.
     """
 
     positions: Array
     weights: Array
     radius: Any
-    sharp: bool = False
 
 
 class Surface(NamedTuple):
@@ -194,7 +192,7 @@ class Box:
                     points[:, (axis + 2) % 3] = v * core[(axis + 2) % 3]
                     positions.append(points)
                     weights.append(np.full(len(along), 1 / 8 / max(len(along), 1)))
-        return Samples(np.concatenate(positions), np.concatenate(weights), rounding, True)
+        return Samples(np.concatenate(positions), np.concatenate(weights), rounding)
 
     def particles(self, spacing: float) -> Samples:
         """A lattice of spheres over the surface; a face has weight 1 in sum if all are alike."""

@@ -126,9 +126,9 @@ def test_particles_of_a_compound_are_refused_by_name():
 @pytest.mark.parametrize("shape", [T, HALVES, DUMBBELL])
 @pytest.mark.parametrize("spacing", [0.01, 0.005])
 def test_samples_lie_on_the_core_of_the_whole(shape, spacing):
-    for group in shape.groups(spacing, 2e-4):
+    for group, sharp in shape.groups(spacing, 2e-4):
         apart = np.min([part.distance(group.positions) for part in shape.parts], axis=0)
-        least = 2e-4 if group.sharp else group.radius
+        least = 2e-4 if sharp else group.radius
         assert np.all(apart > -1.8 * least)  # a corner's inset is sqrt(3) times the rounding
         inset = apart < -0.99 * least
         assert inset.all() or (np.count_nonzero(~inset) == 4 and apart.max() < 1e-12)  # on the seam
@@ -163,7 +163,7 @@ def test_no_sample_lies_on_a_seam_but_where_it_ends_in_an_edge():
 
 
 def test_samples_of_one_radius_make_a_group():
-    assert [group.radius for group in DUMBBELL.groups(0.01, 1e-4)] == [0.02, 0.01]
+    assert [group.samples.radius for group in DUMBBELL.groups(0.01, 1e-4)] == [0.02, 0.01]
     assert len(T.groups(0.01, 1e-4)) == 1
     assert T.groups(0.01, 1e-4)[0].sharp
 

@@ -63,6 +63,7 @@ def test_the_checker_has_nothing_to_say(check, env_id, reward_type, fidelity, re
         {"terminate_on_success": True},
         {"show_forces": True},
         {"target_yaw": True, "obstacles": 2, "render_mode": "rgb_array"},
+        {"block": "t", "render_mode": "rgb_array"},
     ],
 )
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])

@@ -1,0 +1,205 @@
+"""Push takes a T or any Compound: as fair, as physical and as plain to see as the cube."""
+
+import functools
+import pickle
+
+import numpy as np
+import pytest
+
+from physics import Box, Capsule, Compound, Sphere
+from physics.rotation import from_yaw, rotate
+from rigid_envs import scene_view
+from rigid_envs.rendering import Renderer
+from rigid_envs.rewards import distance
+from rigid_envs.tasks.block import BAR, HALF, STEM, Block
+from rigid_envs.tasks.push import MASS, POST_RADIUS, POSTS, RANGE, THRESHOLD
+from tests.rigid_envs.rollout import EPISODE, assert_same, make, make_vec, random_actions, steps_of
+from training.scripted.push import push
+
+T = Block.of("t")
+U = Compound(
+    [(Box((0.01, 0.03, 0.015)), (x, 0, 0)) for x in (-0.02, 0.02)]
+    + [(Box((0.01, 0.01, 0.015)), (0, -0.02, 0))]
+)
+
+
+def corners(block):
+    """[n, 3] m of a block of boxes, in its frame."""
+    return np.concatenate([part.ends[0] for part in block.shape.parts])
+
+
+def test_a_t_is_as_heavy_as_the_cube_and_about_its_size():
+    cube = Block.of("cube")
+    assert T.shape.volume == pytest.approx(1.125 * cube.shape.volume)
+    body = make(block="t")._runner.world.scene.bodies[0]
+    assert body.mass == MASS
+    assert [part.shape.half_extents for part in T.shape.parts] == [BAR, STEM]
+    assert T.height == pytest.approx(BAR[2])
+    assert T.radius == pytest.approx(np.hypot(0.04, 0.02))
+
+
+def test_blocks_start_flat_anywhere_at_any_yaw_and_unsolved():
+    observation, info = make_vec(4000, block="t").reset(seed=0)
+    assert not info["is_success"].any()
+    assert distance(observation["achieved_goal"], observation["desired_goal"]).min() > THRESHOLD
+    place, turn = observation["achieved_goal"], observation["observation"][:, 9:13]
+    np.testing.assert_allclose(place[:, 2], T.height, atol=1e-6)
+    assert np.abs(place[:, :2]).max() <= RANGE
+    np.testing.assert_allclose(turn[:, :2], 0.0, atol=1e-7)
+    yaw = 2.0 * np.arctan2(turn[:, 2], turn[:, 3])
+    share = np.histogram(np.mod(yaw, 2.0 * np.pi), bins=8, range=(0.0, 2.0 * np.pi))[0] / 4000
+    np.testing.assert_allclose(share, 1 / 8, atol=0.03)
+
+
+def test_no_block_starts_on_a_post():
+    envs = make_vec(2000, block="t", obstacles=4, randomize={"size": (0.7, 1.3)})
+    observation, _ = envs.reset(seed=0)
+    place, turn = observation["achieved_goal"].astype(float), observation["observation"][:, 9:13]
+    size = envs._runner.world.parameters.size
+    outline = T.shape.samples(0.002, 0.0).positions
+    points = rotate(turn[:, None].astype(float), size[..., None] * outline) + place[:, None]
+    apart = np.linalg.norm(points[:, :, None, :2] - POSTS, axis=-1)
+    assert apart.min() > POST_RADIUS
+
+
+def test_the_names_of_what_is_seen_are_those_of_a_block():
+    env = make(block="t")
+    names = [bound[0] for bound in env._runner.bounds]
+    assert "block x" in names
+    assert not any("cube" in name for name in names)
+    assert "cube x" in [bound[0] for bound in make()._runner.bounds]
+
+
+def test_a_cube_by_name_is_the_cube_to_the_bit():
+    ends = []
+    for options in ({}, {"block": "cube"}):
+        envs = make_vec(20, reward_type="dense", **options)
+        envs.reset(seed=0)
+        *_, last = steps_of(envs, random_actions(20, 20))
+        ends.append(last)
+    assert_same(*ends)
+
+
+@pytest.mark.parametrize("fidelity", ["balanced", "solid"])
+def test_blind_steps_stay_physical(fidelity):
+    envs = make_vec(256, block="t", fidelity=fidelity, obstacles=2)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    for observation, *_, info in steps_of(envs, random_actions(100, 256)):
+        inside = ~info["out_of_bounds"]
+        assert all(np.isfinite(values).all() for values in observation.values())
+        assert world.kinetic_energy()[inside].max() < 0.97
+        place, turn = observation["achieved_goal"], observation["observation"][:, 9:13]
+        points = rotate(turn[:, None].astype(float), corners(T)) + place[:, None]
+        assert points[inside, :, 2].min() > -0.01
+
+
+def test_a_random_policy_hardly_ever_solves_it():
+    envs = make_vec(1000, block="t")
+    envs.reset(seed=0)
+    for actions in np.random.default_rng(0).uniform(-1.0, 1.0, (EPISODE, 1000, 3)):
+        info = envs.step(actions)[4]
+    assert info["is_success"].mean() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("options", "least"),
+    [
+        ({"block": "t"}, 0.99),
+        ({"block": "t", "fidelity": "solid"}, 0.99),
+        ({"block": "t", "obstacles": 2}, 0.97),
+        ({"block": U}, 0.98),
+    ],
+)
+def test_the_scripted_controller_solves_blocks(options, least):
+    envs = make_vec(300, **options)
+    known = {name: options[name] for name in ("block", "obstacles") if name in options}
+    controller = functools.partial(push, **known)
+    observation, _ = envs.reset(seed=0)
+    for _ in range(EPISODE):
+        observation, _, _, _, info = envs.step(controller(observation))
+    assert info["is_success"].mean() >= least
+
+
+def test_states_and_pickles_hold_the_block():
+    env = make(block=U)
+    env.reset(seed=1)
+    env.step(np.ones(3))
+    state = pickle.loads(pickle.dumps(env.get_state()))
+    expected = env.step(np.zeros(3))
+    env.set_state(state)
+    assert_same(env.step(np.zeros(3)), expected)
+    other = make(block="t")
+    other.reset(seed=1)
+    with pytest.raises(ValueError, match="another scene"):
+        other.set_state(state)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+TALL = Compound([(Box((0.03, 0.03, 0.02)), (0, 0, z)) for z in (-0.04, 0.0, 0.04)])
+FLAT = Compound([(Box((0.03, 0.03, 0.005)), (0, 0, 0))])
+WIDE = Compound([(Box((0.04, 0.02, 0.02)), (x, 0, 0)) for x in (-0.04, 0.04)])
+ROLLING = Compound([(Capsule(0.02, 0.02), (0, 0, 0), (0.0, 1.0, 0.0, 1.0))])
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"block": "T"}, ValueError, r"block must be one of \['cube', 't'\], got 'T'"),
+        ({"block": 3}, TypeError, r"block, if none of \['cube', 't'\], must be Compound, got 3"),
+        ({"block": Sphere(0.02)}, TypeError, "must be Compound, got Sphere"),
+        ({"block": TALL}, ValueError, r"must be 0.015 to 0.08 m high, .*, got 0.12 m"),
+        ({"block": FLAT}, ValueError, r"must be 0.015 to 0.08 m high, .*, got 0.01 m"),
+        ({"block": WIDE}, ValueError, r"must reach at most 0.07 m .*, got 0.08"),
+        ({"block": ROLLING}, ValueError, r"must lie flat, .* at least 0.005 m within"),
+        ({"block": "t", "target_yaw": True}, ValueError, "target_yaw=True asks for the yaw of a c"),
+    ],
+)
+def test_blocks_that_are_none_are_refused_by_name(options, error, match):
+    with pytest.raises(error, match=match):
+        make(**options)
+
+
+def test_a_compound_of_one_box_does_as_a_block():
+    block = Block.of(Compound([(Box((HALF,) * 3), (0, 0, 0))]))
+    assert block.height == HALF
+    assert block.radius == pytest.approx(np.sqrt(2.0) * HALF)
+
+
+# --- pictures -----------------------------------------------------------------------------------
+
+
+def test_a_picture_shows_bar_and_stem_where_they_are():
+    env = make(block="t", render_mode="rgb_array")
+    env.reset(seed=0)
+    yaw, place = 0.7, np.array([0.05, -0.03, T.height])
+    env._runner.world.set_state(position=place, orientation=from_yaw(yaw))
+    bar, stem, *_ = found = scene_view.items(env._runner, 0)
+    along = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    np.testing.assert_allclose(bar.position, place + 0.01 * along, atol=1e-12)
+    np.testing.assert_allclose(stem.position, place - 0.02 * along, atol=1e-12)
+    for item, half in ((bar, BAR), (stem, STEM)):
+        assert item.shape.half_extents == half
+        np.testing.assert_allclose(item.orientation, from_yaw(yaw), atol=1e-12)
+        assert item.color == bar.color
+    renderer = Renderer(480, 480, env._runner.task.camera)
+    signs = scene_view.signs(env._runner, 0)
+    np.testing.assert_array_equal(env.render(), renderer.frame(found, signs=signs))
+    for item in (bar, stem):
+        others = [other for other in found if other is not item]
+        assert (env.render() != renderer.frame(others, signs=signs)).any(axis=2).sum() > 50
+
+
+def test_a_picture_of_particles_shows_each_sample_once_beside_its_part():
+    env = make(block="t", render_mode="rgb_array", show_particles=True)
+    env.reset(seed=0)
+    bar, stem, *_ = scene_view.items(env._runner, 0, particles=True)
+    samples, radius = env._runner.world.samples(0)
+    counts = [len(item.particles.positions) for item in (bar, stem)]
+    assert sum(counts) == len(samples)
+    assert min(counts) > 10
+    for item, half in ((bar, BAR), (stem, STEM)):
+        assert np.all(np.abs(item.particles.positions) <= np.array(half) + 1e-9)
+        np.testing.assert_array_equal(item.particles.radius, radius)
+    assert env.render().shape == (480, 480, 3)
