@@ -5,8 +5,9 @@ runs/<algo>/<env id>_<number>/
     run.json         algorithm, environment, command, seed, git commit, time of start
     versions.json    Python, platform and packages
     progress.csv     the learning curve; events.out.tfevents.* the same for TensorBoard
-    model.zip        the policy, as of the last checkpoint
-    vecnormalize.pkl statistics of the observations, if they are normalised
+    policy.policy    what acts, as of the last checkpoint: text and numbers, see policy_file.py
+    model.zip        the same in Stable-Baselines3's own form, a pickle
+    vecnormalize.pkl likewise its statistics of the observations, if they are normalised
 """
 
 import io
@@ -37,13 +38,18 @@ class RunFolder:
     """The folder."""
 
     @property
+    def policy(self) -> Path:
+        """What acts, as of the last checkpoint."""
+        return self.path / "policy.policy"
+
+    @property
     def model(self) -> Path:
-        """The policy, as of the last checkpoint."""
+        """Stable-Baselines3's model, as of the last checkpoint."""
         return self.path / "model.zip"
 
     @property
     def normalization(self) -> Path:
-        """Statistics of the observations; absent if they are not normalised."""
+        """Its statistics of the observations; absent if they are not normalised."""
         return self.path / "vecnormalize.pkl"
 
     @property
@@ -86,12 +92,12 @@ def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
         "env_id": config.env_id,
         "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
         "seed": config.seed,
-        "git_commit": _git_commit(),
+        "git_commit": git_commit(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     _write_text(path / "config.yaml", config.as_yaml())
     _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")
-    _write_text(path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
+    _write_text(path / "versions.json", json.dumps(package_versions(), indent=2) + "\n")
     return RunFolder(path)
 
 
@@ -161,7 +167,8 @@ def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
     ]
 
 
-def _versions() -> dict[str, Any]:
+def package_versions() -> dict[str, Any]:
+    """Of Python, the platform and the packages that decide a run."""
     versions: dict[str, Any] = {
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -175,7 +182,7 @@ def _versions() -> dict[str, Any]:
     return versions
 
 
-def _git_commit() -> str | None:
+def git_commit() -> str | None:
     """The commit of this project's source tree; none if it is installed from elsewhere."""
     source = Path(__file__).resolve().parents[1]
     try:

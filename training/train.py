@@ -21,6 +21,7 @@ from training.checkpoint import PeriodicCheckpoint, save_checkpoint
 from training.config import PPOConfig, SACConfig, TrainConfig
 from training.environments import make_vector_env
 from training.errors import UsageError
+from training.export import policy_file_of
 from training.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.run_folder import RunFolder, create_run_folder
 from training.vec_env import RigidVecEnv
@@ -87,11 +88,12 @@ def train(
     worlds = RigidVecEnv(make_vector_env(config.env_id, config.n_envs, **config.env_kwargs))
     try:
         model = _build(config, _wrapped(worlds, config), _checked(device))
+        policy_file_of(model, config).to_bytes()  # what can't be kept is not worth training
         folder = create_run_folder(log_folder, config)
         model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
         progress = TrainingProgress(config.n_timesteps, quiet)
         callbacks: list[BaseCallback] = [
-            PeriodicCheckpoint(folder, save_every or max(config.n_timesteps // 10, 1)),
+            PeriodicCheckpoint(folder, config, save_every or max(config.n_timesteps // 10, 1)),
             progress,
         ]
         if isinstance(config, PPOConfig):
@@ -107,7 +109,7 @@ def train(
         finally:
             progress.close()
         seconds = time.perf_counter() - start
-        save_checkpoint(model, folder)
+        save_checkpoint(model, folder, config)
         model.logger.close()
         return TrainResult(
             folder=folder,
