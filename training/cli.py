@@ -82,18 +82,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
-    config = _config(options)  # first: a mistake in it should not wait for torch
+    # first: a mistake in settings should not wait for torch
+    config = _config(options) if options.resume is None else None
+    if config is None:
+        _refuse_contradictions(options)
 
     from training.demo import print_training
-    from training.train import train
+    from training.run_folder import RunFolder
+    from training.train import resume, train
 
-    trained = train(
-        config,
-        options.log_folder,
-        device=options.device,
-        num_threads=options.num_threads,
-        save_every=options.save_freq,
-    )
+    machine = {
+        "device": options.device,
+        "num_threads": options.num_threads,
+        "save_every": options.save_freq,
+    }
+    if config is None:
+        trained = resume(RunFolder(options.resume), **machine)
+    else:
+        trained = train(config, options.log_folder, **machine)
     print_training(trained)
     return INTERRUPTED if trained.interrupted else 0
 
@@ -197,9 +203,16 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> "TrainConfig":
-    from training.config import load_config, parse_settings
+    from training.config import load_config
 
-    config = load_config(options.algo, options.env, options.config)
+    config = load_config(options.algo or DEMO_ALGO, options.env or DEMO_ENV, options.config)
+    return _changed(config, options)
+
+
+def _changed(config: "TrainConfig", options: argparse.Namespace) -> "TrainConfig":
+    """The settings, with those that flags give in their place."""
+    from training.config import parse_settings
+
     changes = parse_settings(options.hyperparams, "--hyperparams")
     for name in ("n_timesteps", "n_envs", "seed"):
         if getattr(options, name) is not None:
@@ -208,6 +221,28 @@ def _config(options: argparse.Namespace) -> "TrainConfig":
     if changed_env:
         changes["env_kwargs"] = {**config.env_kwargs, **changed_env}
     return config.replace(**changes)
+
+
+def _refuse_contradictions(options: argparse.Namespace) -> None:
+    """Raises UsageError where flags would make the run to resume another one."""
+    from training.run_folder import RunFolder
+
+    if options.config is not None:
+        raise UsageError("--config does not go with --resume: a run goes on with its own settings")
+    config = RunFolder(options.resume).config()
+    for name, given, own in (
+        ("--algo", options.algo, config.algo),
+        ("--env", options.env, config.env_id),
+    ):
+        if given not in (None, own):
+            raise UsageError(f"{name} is {given!r}, but {options.resume} is a run of {own!r}")
+    asked = _changed(config, options).as_mapping()
+    for name, value in config.as_mapping().items():
+        if asked[name] != value:
+            raise UsageError(
+                f"{name} is asked to be {asked[name]!r}, but {options.resume} has {value!r}, "
+                "and a run goes on as it began: leave it away, or train anew"
+            )
 
 
 def _env_kwargs(options: argparse.Namespace) -> dict[str, Any]:
@@ -269,6 +304,9 @@ def _parser() -> argparse.ArgumentParser:
 
     training = command("train", _train, "Train a policy into a run folder of its own.")
     add_training(training)
+    training.add_argument(
+        "--resume", type=Path, metavar="RUN", help="go on with this run from its last checkpoint"
+    )
     training.add_argument(
         "--save-freq", type=count, help="steps between checkpoints (default: a tenth of the run)"
     )

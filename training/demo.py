@@ -46,8 +46,9 @@ def demo(
 
 def print_training(trained: TrainResult) -> None:
     """Prints how training went, in a line."""
+    speed = (trained.steps - trained.steps_before) / trained.seconds
     print(
         f"{'interrupted' if trained.interrupted else 'trained'} after {trained.steps:,} steps in "
-        f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s, "
+        f"{trained.seconds:.0f} s ({speed:,.0f} steps/s, "
         f"{trained.environment_share:.0%} of the time in the environments): {trained.folder.path}"
     )

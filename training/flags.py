@@ -21,9 +21,9 @@ class Parser(argparse.ArgumentParser):
 def add_training(parser: argparse.ArgumentParser) -> None:
     """What decides a training run, and the machine it runs on."""
     parser.add_argument(
-        "--algo", default=DEMO_ALGO, help="algorithm, ppo or sac (default: %(default)s)"
+        "--algo", help=f"algorithm, ppo or sac (default: {DEMO_ALGO}, or that of the run)"
     )
-    parser.add_argument("--env", default=DEMO_ENV, help="environment id (default: %(default)s)")
+    parser.add_argument("--env", help=f"environment id (default: {DEMO_ENV}, or that of the run)")
     parser.add_argument("--config", type=Path, help="YAML file (default: configs/<algo>.yaml)")
     parser.add_argument("-n", "--n-timesteps", type=count, help="environment steps to train for")
     parser.add_argument("--n-envs", type=count, help="worlds simulated side by side")

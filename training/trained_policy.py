@@ -91,7 +91,9 @@ def _unpickled(
     trust_pickle: bool,
 ) -> Policy:
     """The policy in Stable-Baselines3's own files; arguments and errors as of `trained_policy`."""
-    folder = RunFolder(file.parent)
+    # a model.zip lies in a checkpoint, and that in its run folder
+    in_run = (file.parent.parent / "run.json").exists()
+    folder = RunFolder(file.parent.parent if in_run else file.parent)
     if not file.exists():
         raise UsageError(f"{folder.path} holds no checkpoint yet: {file.name} is missing")
     if not trust_pickle:

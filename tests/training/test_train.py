@@ -19,7 +19,7 @@ def test_a_run_leaves_logs_and_a_policy(quick_ppo, tmp_path):
     assert not result.interrupted
     assert 0 < result.environment_share < 1
     names = {path.name.split(".")[0] for path in result.folder.path.iterdir()}
-    assert names == {"config", "run", "versions", "progress", "model", "policy", "events"}
+    assert names == {"config", "run", "versions", "progress", "checkpoint_2", "events"}
     with result.folder.progress.open() as file:
         rows = list(csv.DictReader(file))
     assert [int(row["time/total_timesteps"]) for row in rows] == [80, 160]
