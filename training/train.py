@@ -96,7 +96,8 @@ def train(
         policy_file_of(model, config).to_bytes()  # what can't be kept is not worth training
         folder = create_run_folder(log_folder, config)
         with folder.claimed():
-            model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
+            with _naming_full_disks(folder):
+                model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
             return _learn(model, worlds, folder, config, save_every, quiet)
 
 
@@ -146,7 +147,8 @@ def resume(
                     "nothing to resume"
                 )
             folder.note_resumption(model.num_timesteps)
-            model.set_logger(continued_logger(folder, checkpoint, state))
+            with _naming_full_disks(folder):
+                model.set_logger(continued_logger(folder, checkpoint, state))
             return _learn(model, worlds, folder, config, save_every, quiet, seconds)
 
 
@@ -176,19 +178,19 @@ def _learn(
     interrupted = False
     try:
         left = config.n_timesteps - steps_before
-        model.learn(left, callback=callbacks, reset_num_timesteps=steps_before == 0)
+        with _naming_full_disks(folder):
+            model.learn(left, callback=callbacks, reset_num_timesteps=steps_before == 0)
     except KeyboardInterrupt:
         interrupted = True
         if isinstance(model, OnPolicyAlgorithm) and checkpoints.rollout_from is not None:
             # no update has learned from the steps since, and none will
             model.num_timesteps = checkpoints.rollout_from
-    except OSError as error:  # the learning curve could not be written
-        raise UsageError(f"training stopped in {folder.path}: {error.strerror or error}") from error
     finally:
         progress.close()
     seconds = time.perf_counter() - start
     save(finished=not interrupted)
-    model.logger.close()
+    with _naming_full_disks(folder):
+        model.logger.close()
     return TrainResult(
         folder=folder,
         steps=model.num_timesteps,
@@ -198,6 +200,15 @@ def _learn(
         success_rate=success_rate(model),
         interrupted=interrupted,
     )
+
+
+@contextmanager
+def _naming_full_disks(folder: RunFolder) -> Iterator[None]:
+    """Makes a UsageError of what the system refuses, as to write the learning curve."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"training stopped in {folder.path}: {error.strerror or error}") from error
 
 
 @contextmanager

@@ -4,6 +4,8 @@ import base64
 import hashlib
 import json
 import pickle
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -102,6 +104,16 @@ def test_an_action_does_not_depend_on_how_many_worlds_act(kept):
     together = policy.act(all_of_them)
     alone = [policy.act({k: v[i : i + 1] for k, v in all_of_them.items()})[0] for i in range(50)]
     np.testing.assert_allclose(alone, together[:50], atol=1e-7)
+
+
+def test_reading_takes_neither_torch_nor_stable_baselines(kept):
+    code = (
+        "import sys; from pathlib import Path; from training.policy_file import load_policy_file;"
+        "load_policy_file(Path(sys.argv[1]));"
+        "sys.exit(any(name in sys.modules for name in ('torch', 'stable_baselines3')))"
+    )
+    words = [sys.executable, "-c", code, str(kept)]
+    assert subprocess.run(words, cwd=Path(__file__).parents[2]).returncode == 0
 
 
 def test_the_header_says_what_was_trained(kept):
@@ -216,6 +228,13 @@ def test_no_module_is_imported_that_a_file_names(kept, tmp_path, monkeypatch):
     other = {"id": "intruder:RigidEnvs/Posh-v0", "version": 0, "kwargs": {}}
     with pytest.raises(UsageError, match="not installed; did you mean --env RigidEnvs/Push-v0"):
         read_policy(rewritten(kept, tmp_path, environment=other))
+
+
+def test_a_policy_that_has_diverged_is_not_written(kept):
+    content = load_policy_file(kept)
+    content.layers[0] = (content.layers[0][0] * np.float32(np.nan), content.layers[0][1])
+    with pytest.raises(UsageError, match="training has diverged"):
+        content.to_bytes()
 
 
 def test_an_environment_that_is_shown_otherwise_is_named(kept):

@@ -16,6 +16,7 @@ import pytest
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import CSVOutputFormat
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from training import checkpoint as checkpoint_module
 from training import cli
@@ -61,6 +62,11 @@ def with_stop(stop: type[BaseCallback]):
     return Both
 
 
+def steps_in_tensorboard(folder: RunFolder) -> list[int]:
+    events = EventAccumulator(str(folder.path)).Reload()
+    return [event.step for event in events.Scalars("rollout/ep_rew_mean")]
+
+
 def steps_of(folder: RunFolder) -> list[int]:
     """Steps of each row of the learning curve, of which each must have as many cells."""
     with folder.progress.open(newline="") as file:
@@ -89,6 +95,7 @@ def test_ppo_goes_on_to_the_steps_it_was_made_for(
     result = resume(folder, quiet=True)
     assert (result.steps, result.steps_before) == (400, 160)
     assert steps_of(folder) == [80, 160, 240, 320, 400]
+    assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
     after = read_learning_curve(folder)
     assert after[:2] == before[:2]
     seconds = [row["time/wall_time"] for row in after]
@@ -244,8 +251,13 @@ def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path
         with pytest.raises(UsageError, match=r"training stopped in .*: No space left on device"):
             train(quick_ppo.replace(n_timesteps=400), tmp_path, save_every=1, quiet=True)
     folder = RunFolder(tmp_path / "ppo" / "Test-Reach-v0_1")
+    with monkeypatch.context() as patched:
+        patched.setattr("training.learning_curve.shutil.copyfile", full_disk)
+        with pytest.raises(UsageError, match=r"training stopped in .*: No space left on device"):
+            resume(folder, quiet=True)
     assert resume(folder, quiet=True).steps == 400
     assert steps_of(folder) == [80, 160, 240, 320, 400]
+    assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
 
 
 def test_what_cannot_be_resumed_is_named(quick_ppo, tmp_path, monkeypatch):
