@@ -1,4 +1,4 @@
-"""The command line: `rigid-envs train | evaluate | record | scripted | play | plot | demo`.
+"""The command line: `rigid-envs COMMAND`, as train, evaluate, record, export, play.
 
 Starts without Stable-Baselines3 or torch: each command imports what it needs, and says which extra
 installs what is missing. Flags follow rl-baselines3-zoo where it has a counterpart.
@@ -9,17 +9,27 @@ import importlib.util
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from training.errors import UsageError
+from training.flags import (
+    DEMO_ALGO,
+    DEMO_ENV,
+    Parser,
+    add_environment,
+    add_episodes,
+    add_latest,
+    add_policy,
+    add_training,
+    count,
+    whole,
+)
 
 if TYPE_CHECKING:
     from training.config import TrainConfig
     from training.policy import Policy
     from training.run_folder import RunFolder
 
-DEMO_ALGO = "ppo"
-DEMO_ENV = "RigidEnvs/Push-v0"
 TRAIN_EXTRA = (
     "stable_baselines3",
     "torch",
@@ -72,18 +82,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
-    config = _config(options)  # first: a mistake in it should not wait for torch
+    # first: a mistake in settings should not wait for torch
+    config = _config(options) if options.resume is None else None
+    if config is None:
+        _refuse_contradictions(options)
 
     from training.demo import print_training
-    from training.train import train
+    from training.run_folder import RunFolder
+    from training.train import resume, train
 
-    trained = train(
-        config,
-        options.log_folder,
-        device=options.device,
-        num_threads=options.num_threads,
-        save_every=options.save_freq,
-    )
+    machine = {
+        "device": options.device,
+        "num_threads": options.num_threads,
+        "save_every": options.save_freq,
+    }
+    if config is None:
+        trained = resume(RunFolder(options.resume), **machine)
+    else:
+        trained = train(config, options.log_folder, **machine)
     print_training(trained)
     return INTERRUPTED if trained.interrupted else 0
 
@@ -103,15 +119,41 @@ def _record(options: argparse.Namespace) -> int:
     from training.record import record
 
     policy = _policy(options)
-    folder = policy.folder or options.log_folder / policy.name
+    given = Path(options.policy) if options.policy else None
+    beside = (policy.folder or options.log_folder / policy.name) / "video.mp4"
+    if given is not None and given.suffix == ".policy":  # its folder may hold others
+        beside = given.with_suffix(".mp4")
     video, still = record(
         policy,
-        options.output or folder / "video.mp4",
+        options.output or beside,
         episodes=options.n_episodes,
         seed=FIRST_SEED if options.seed is None else options.seed,
         **_env_kwargs(options),
     )
     print(f"video   {video}\npicture {still}")
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    from training.evaluate import FIRST_SEED, evaluate
+    from training.export import export_run
+    from training.policy_header import Success
+    from training.trained_policy import trained_policy
+
+    folder = _run_folder(options)
+    success = None
+    if options.n_episodes is not None:
+        policy = trained_policy(folder.path, algo=options.algo)
+        result = evaluate(policy, options.n_episodes, seed=FIRST_SEED)
+        success = Success(
+            options.n_episodes,
+            float(result.success_at_end.mean()),
+            policy.env_kwargs.get("fidelity"),
+            FIRST_SEED,
+        )
+    output = options.output or Path(f"{folder.path.name}.policy")
+    for file in export_run(folder, output, success=success, sb3=options.sb3):
+        print(file)
     return 0
 
 
@@ -161,9 +203,16 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> "TrainConfig":
-    from training.config import load_config, parse_settings
+    from training.config import load_config
 
-    config = load_config(options.algo, options.env, options.config)
+    config = load_config(options.algo or DEMO_ALGO, options.env or DEMO_ENV, options.config)
+    return _changed(config, options)
+
+
+def _changed(config: "TrainConfig", options: argparse.Namespace) -> "TrainConfig":
+    """The settings, with those that flags give in their place."""
+    from training.config import parse_settings
+
     changes = parse_settings(options.hyperparams, "--hyperparams")
     for name in ("n_timesteps", "n_envs", "seed"):
         if getattr(options, name) is not None:
@@ -172,6 +221,28 @@ def _config(options: argparse.Namespace) -> "TrainConfig":
     if changed_env:
         changes["env_kwargs"] = {**config.env_kwargs, **changed_env}
     return config.replace(**changes)
+
+
+def _refuse_contradictions(options: argparse.Namespace) -> None:
+    """Raises UsageError where flags would make the run to resume another one."""
+    from training.run_folder import RunFolder
+
+    if options.config is not None:
+        raise UsageError("--config does not go with --resume: a run goes on with its own settings")
+    config = RunFolder(options.resume).config()
+    for name, given, own in (
+        ("--algo", options.algo, config.algo),
+        ("--env", options.env, config.env_id),
+    ):
+        if given not in (None, own):
+            raise UsageError(f"{name} is {given!r}, but {options.resume} is a run of {own!r}")
+    asked = _changed(config, options).as_mapping()
+    for name, value in config.as_mapping().items():
+        if asked[name] != value:
+            raise UsageError(
+                f"{name} is asked to be {asked[name]!r}, but {options.resume} has {value!r}, "
+                "and a run goes on as it began: leave it away, or train anew"
+            )
 
 
 def _env_kwargs(options: argparse.Namespace) -> dict[str, Any]:
@@ -186,7 +257,8 @@ def _env_kwargs(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _policy(options: argparse.Namespace) -> "Policy":
-    from training.policy import SCRIPTED, scripted_policy, trained_policy
+    from training.policy import SCRIPTED, scripted_policy
+    from training.trained_policy import trained_policy
 
     if options.policy == SCRIPTED:
         return scripted_policy(options.env or DEMO_ENV, **_env_kwargs(options))
@@ -196,6 +268,7 @@ def _policy(options: argparse.Namespace) -> "Policy":
         env_id=options.env,
         deterministic=not options.stochastic,
         device=options.device,
+        trust_pickle=options.trust_pickle,
     )
 
 
@@ -215,15 +288,8 @@ def _require(extra: str, modules: Sequence[str]) -> None:
         )
 
 
-class _Parser(argparse.ArgumentParser):
-    """Raises the user's mistakes instead of printing the whole usage and leaving."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (see {self.prog} --help)")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="rigid-envs", description="Train and watch policies on rigid bodies.")
+    parser = Parser(prog="rigid-envs", description="Train and watch policies on rigid bodies.")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     def command(
@@ -237,25 +303,41 @@ def _parser() -> argparse.ArgumentParser:
         return added
 
     training = command("train", _train, "Train a policy into a run folder of its own.")
-    _add_training(training)
+    add_training(training)
     training.add_argument(
-        "--save-freq", type=_count, help="steps between checkpoints (default: a tenth of the run)"
+        "--resume", type=Path, metavar="RUN", help="go on with this run from its last checkpoint"
+    )
+    training.add_argument(
+        "--save-freq", type=count, help="steps between checkpoints (default: a tenth of the run)"
     )
 
     evaluation = command("evaluate", _evaluate, "Measure how often a policy succeeds.")
-    _add_policy(evaluation)
-    _add_episodes(evaluation, 1000)
+    add_policy(evaluation)
+    add_episodes(evaluation, 1000)
 
     recording = command("record", _record, "Film a policy: an mp4 and a still.")
-    _add_policy(recording)
-    _add_episodes(recording, 8)
+    add_policy(recording)
+    add_episodes(recording, 8)
     recording.add_argument(
         "-o", "--output", type=Path, help="mp4 to write (default: video.mp4 in the run folder)"
     )
 
+    exporting = command("export", _export, "Copy the policy of a run into one small file.")
+    exporting.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")
+    add_latest(exporting)
+    exporting.add_argument(
+        "-o", "--output", type=Path, help="file to write (default: <run>.policy, in this folder)"
+    )
+    exporting.add_argument(
+        "-n", "--n-episodes", type=count, help="measure success on as many, and say so in the file"
+    )
+    exporting.add_argument(
+        "--sb3", action="store_true", help="copy Stable-Baselines3's model and statistics too"
+    )
+
     scripted = command("scripted", _scripted, "Measure the scripted controller of an environment.")
     scripted.add_argument("--env", default=DEMO_ENV, help="environment id (default: %(default)s)")
-    _add_episodes(scripted, 1000)
+    add_episodes(scripted, 1000)
 
     playing = command(
         "play", _play, "Drive the tool by keyboard in a window.", ("render", RENDER_EXTRA)
@@ -263,124 +345,28 @@ def _parser() -> argparse.ArgumentParser:
     playing.add_argument(
         "env", nargs="?", default=DEMO_ENV, help="environment id (default: %(default)s)"
     )
-    playing.add_argument("--seed", type=_whole, help="of the first episode (default: any)")
+    playing.add_argument("--seed", type=whole, help="of the first episode (default: any)")
     playing.add_argument("--reward", choices=("sparse", "dense"), help="reward to show")
-    playing.add_argument("--blocks", type=_count, help="cubes to stack")
+    playing.add_argument("--blocks", type=count, help="cubes to stack")
     playing.add_argument("--show-forces", action="store_true", help="draw contact forces")
     playing.add_argument(
         "--show-particles", action="store_true", help="draw what touches, not exact shapes"
     )
-    _add_environment(playing)
+    add_environment(playing)
 
     plotting = command("plot", _plot, "Draw the learning curve of a run.")
     plotting.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")
-    _add_latest(plotting)
+    add_latest(plotting)
     plotting.add_argument(
         "-o", "--output", type=Path, help="PNG (default: learning_curve.png in the run folder)"
     )
 
     demonstration = command("demo", _demo, "Train, evaluate, film and plot, in one go.")
-    _add_training(demonstration)
+    add_training(demonstration)
     demonstration.add_argument(
-        "--n-episodes", type=_count, default=1000, help="to evaluate on (default: %(default)s)"
+        "--n-episodes", type=count, default=1000, help="to evaluate on (default: %(default)s)"
     )
     return parser
-
-
-def _add_training(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--algo", default=DEMO_ALGO, help="algorithm, ppo or sac (default: %(default)s)"
-    )
-    parser.add_argument("--env", default=DEMO_ENV, help="environment id (default: %(default)s)")
-    parser.add_argument("--config", type=Path, help="YAML file (default: configs/<algo>.yaml)")
-    parser.add_argument("-n", "--n-timesteps", type=_count, help="environment steps to train for")
-    parser.add_argument("--n-envs", type=_count, help="worlds simulated side by side")
-    parser.add_argument("--seed", type=_whole, help="seed of worlds and network")
-    parser.add_argument(
-        "-params",
-        "--hyperparams",
-        nargs="+",
-        default=[],
-        metavar="KEY:VALUE",
-        help="settings over those of the file, as in n_epochs:4 gamma:0.95",
-    )
-    parser.add_argument("--num-threads", type=_count, help="threads of torch (default: at most 2)")
-    _add_folder(parser)
-    _add_environment(parser)
-    _add_device(parser)
-
-
-def _add_policy(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "policy",
-        nargs="?",
-        metavar="POLICY",
-        help='run folder, model.zip or "scripted" (default: latest run of --algo on --env)',
-    )
-    _add_latest(parser)
-    _add_device(parser)
-    parser.add_argument("--stochastic", action="store_true", help="draw actions, not their mean")
-
-
-def _add_latest(parser: argparse.ArgumentParser) -> None:
-    """What finds the latest run, and describes a model.zip that lies in no run folder."""
-    parser.add_argument("--algo", help=f"algorithm, ppo or sac (default: the run's, {DEMO_ALGO})")
-    parser.add_argument("--env", help=f"environment id (default: the run's, {DEMO_ENV})")
-    _add_folder(parser)
-
-
-def _add_folder(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "-f",
-        "--log-folder",
-        type=Path,
-        default=Path("runs"),
-        help="where run folders are (default: %(default)s)",
-    )
-
-
-def _add_episodes(parser: argparse.ArgumentParser, default: int) -> None:
-    parser.add_argument(
-        "-n", "--n-episodes", type=_count, default=default, help="(default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=_whole, help="of the first episode (default: 1000000)")
-    _add_environment(parser)
-
-
-def _add_environment(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--fidelity", help="fidelity preset (default: as configured)")
-    parser.add_argument(
-        "--env-kwargs",
-        nargs="+",
-        default=[],
-        metavar="KEY:VALUE",
-        help="arguments of the environment, as in reward_type:sparse",
-    )
-
-
-def _add_device(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--device", default="cpu", help="torch device of the networks (default: %(default)s)"
-    )
-
-
-def _count(text: str) -> int:
-    """Reads an integer of at least 1; 1e6 and 1_000_000 are fine."""
-    value = _whole(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least 1")
-    return value
-
-
-def _whole(text: str) -> int:
-    """Reads an integer of at least 0."""
-    try:
-        value = float(text)
-        if value >= 0 and value.is_integer():
-            return int(value)
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least 0")
 
 
 if __name__ == "__main__":

@@ -6,10 +6,10 @@ from pathlib import Path
 from training.config import TrainConfig
 from training.evaluate import Evaluation, evaluate, print_evaluation
 from training.plot import plot_learning_curve
-from training.policy import trained_policy
 from training.record import record
 from training.run_folder import RunFolder
 from training.train import TrainResult, train
+from training.trained_policy import trained_policy
 
 
 def demo(
@@ -32,7 +32,7 @@ def demo(
     start = time.perf_counter()
     trained = train(config, log_folder, device=device, num_threads=num_threads)
     print_training(trained)
-    policy = trained_policy(trained.folder.path, device=device)
+    policy = trained_policy(trained.folder.path)
     result = evaluate(policy, episodes)
     video, still = record(policy, trained.folder.path / "video.mp4")
     curve = plot_learning_curve(trained.folder)
@@ -46,8 +46,9 @@ def demo(
 
 def print_training(trained: TrainResult) -> None:
     """Prints how training went, in a line."""
+    speed = (trained.steps - trained.steps_before) / trained.seconds
     print(
         f"{'interrupted' if trained.interrupted else 'trained'} after {trained.steps:,} steps in "
-        f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s, "
+        f"{trained.seconds:.0f} s ({speed:,.0f} steps/s, "
         f"{trained.environment_share:.0%} of the time in the environments): {trained.folder.path}"
     )

@@ -12,7 +12,7 @@ from training.errors import UsageError, nearest
 Made = TypeVar("Made")
 
 
-def make_vector_env(env_id: str, num_envs: int, **env_kwargs: Any) -> VectorEnv:
+def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorEnv:
     """The native vector environment, which resets ended worlds within the step.
 
     Raises:
@@ -31,7 +31,7 @@ def make_vector_env(env_id: str, num_envs: int, **env_kwargs: Any) -> VectorEnv:
     )
 
 
-def make_single_env(env_id: str, **env_kwargs: Any) -> gym.Env:
+def make_single_env(env_id: str, /, **env_kwargs: Any) -> gym.Env:
     """The single environment.
 
     Raises:

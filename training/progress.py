@@ -16,9 +16,14 @@ class TrainingProgress(BaseCallback):
     """A bar with success rate, speed and remaining time; without a terminal, a line now and then.
 
     It also records the wall time with each row of the learning curve.
+
+    Args:
+        total_steps: Environment steps of the run.
+        quiet: Show nothing.
+        seconds_before: Wall time of the run before it was resumed.
     """
 
-    def __init__(self, total_steps: int, quiet: bool = False):
+    def __init__(self, total_steps: int, quiet: bool = False, seconds_before: float = 0.0):
         super().__init__()
         self.console = Console(quiet=quiet)
         self.bar = Progress(
@@ -32,6 +37,8 @@ class TrainingProgress(BaseCallback):
             refresh_per_second=2,
         )
         self.total_steps = total_steps
+        self.seconds_before = seconds_before
+        self.steps_before = 0
         self.task = self.bar.add_task("training", total=total_steps, success="–", speed=0.0)
         self.started = self.shown = self.written = time.perf_counter()
 
@@ -42,6 +49,7 @@ class TrainingProgress(BaseCallback):
         self.bar.stop()
 
     def _on_training_start(self) -> None:
+        self.steps_before = self.model.num_timesteps
         self.started = self.shown = self.written = time.perf_counter()
         self.bar.start()
 
@@ -53,11 +61,12 @@ class TrainingProgress(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        self.logger.record("time/wall_time", round(time.perf_counter() - self.started, 3))
+        seconds = self.seconds_before + time.perf_counter() - self.started
+        self.logger.record("time/wall_time", round(seconds, 3))
 
     def _show(self) -> None:
         now = time.perf_counter()
-        speed = self.num_timesteps / max(now - self.started, 1e-9)
+        speed = (self.model.num_timesteps - self.steps_before) / max(now - self.started, 1e-9)
         success = success_rate(self.model)
         shown = "–" if success is None else f"{success:.1%}"
         fields: dict[str, Any] = {"success": shown, "speed": speed}

@@ -5,8 +5,7 @@ runs/<algo>/<env id>_<number>/
     run.json         algorithm, environment, command, seed, git commit, time of start
     versions.json    Python, platform and packages
     progress.csv     the learning curve; events.out.tfevents.* the same for TensorBoard
-    model.zip        the policy, as of the last checkpoint
-    vecnormalize.pkl statistics of the observations, if they are normalised
+    checkpoint_<n>/  the policy, and what training goes on from, see checkpoint.py
 """
 
 import io
@@ -26,6 +25,12 @@ from typing import Any
 from training.config import TrainConfig, load_config
 from training.errors import UsageError
 
+try:
+    import fcntl
+except ImportError:  # not on Windows, where nothing keeps two processes apart
+    fcntl = None  # type: ignore[assignment]
+
+CHECKPOINT = "checkpoint"
 PACKAGES = ("rigid-envs", "numpy", "numba", "gymnasium", "stable-baselines3", "torch")
 
 
@@ -36,15 +41,33 @@ class RunFolder:
     path: Path
     """The folder."""
 
+    def checkpoints(self) -> list[tuple[int, Path]]:
+        """Number and path of each checkpoint: of the highest, which is whole, and of remains."""
+        return [
+            (int(path.name.removeprefix(f"{CHECKPOINT}_")), path)
+            for path in self.path.glob(f"{CHECKPOINT}_*")
+            if path.name.removeprefix(f"{CHECKPOINT}_").isdecimal()
+        ]
+
+    @property
+    def checkpoint(self) -> Path:
+        """The last checkpoint; the folder itself before the first."""
+        return max(self.checkpoints(), default=(0, self.path))[1]
+
+    @property
+    def policy(self) -> Path:
+        """What acts, as of the last checkpoint."""
+        return self.checkpoint / "policy.policy"
+
     @property
     def model(self) -> Path:
-        """The policy, as of the last checkpoint."""
-        return self.path / "model.zip"
+        """Stable-Baselines3's model, as of the last checkpoint."""
+        return self.checkpoint / "model.zip"
 
     @property
     def normalization(self) -> Path:
-        """Statistics of the observations; absent if they are not normalised."""
-        return self.path / "vecnormalize.pkl"
+        """Its statistics of the observations; absent if they are not normalised."""
+        return self.checkpoint / "vecnormalize.pkl"
 
     @property
     def progress(self) -> Path:
@@ -67,6 +90,35 @@ class RunFolder:
             raise UsageError(f"{description} is damaged: algo or env_id cannot be read") from None
         return load_config(algo, env_id, self.path / "config.yaml")
 
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Keeps other processes from training here; the claim ends with ours, however it ends.
+
+        Raises:
+            UsageError: Another process trains here.
+        """
+        with (self.path / "config.yaml").open("rb") as file:
+            if fcntl is not None:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    raise UsageError(f"{self.path} is being trained by another process") from None
+            yield
+
+    def note_resumption(self, steps: int) -> None:
+        """Adds to run.json that the run goes on, from how many steps and by which command.
+
+        Raises:
+            UsageError: It cannot be written.
+        """
+        description = self.path / "run.json"
+        try:
+            run = json.loads(description.read_text(encoding="utf-8"))
+            run.setdefault("resumed", []).append({"steps": steps, **_circumstances()})
+            _write_text(description, json.dumps(run, indent=2) + "\n")
+        except OSError as error:
+            raise UsageError(f"{description} cannot be written: {error.strerror}") from None
+
 
 def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
     """Makes the next free folder of the algorithm and environment, and describes the run in it.
@@ -84,14 +136,15 @@ def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
     run = {
         "algo": config.algo,
         "env_id": config.env_id,
-        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
         "seed": config.seed,
-        "git_commit": _git_commit(),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        **_circumstances(),
     }
-    _write_text(path / "config.yaml", config.as_yaml())
-    _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")
-    _write_text(path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
+    try:
+        _write_text(path / "config.yaml", config.as_yaml())
+        _write_text(path / "versions.json", json.dumps(package_versions(), indent=2) + "\n")
+        _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")  # last: a run it is now
+    except OSError as error:
+        raise UsageError(f"cannot write to {path}: {error.strerror}") from None
     return RunFolder(path)
 
 
@@ -125,6 +178,14 @@ def written_whole(path: Path) -> Iterator[io.BufferedWriter]:
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def _circumstances() -> dict[str, Any]:
+    return {
+        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "git_commit": git_commit(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def _make_next(prefix: Path, number: int) -> Path:
@@ -161,7 +222,8 @@ def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
     ]
 
 
-def _versions() -> dict[str, Any]:
+def package_versions() -> dict[str, Any]:
+    """Of Python, the platform and the packages that decide a run."""
     versions: dict[str, Any] = {
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -175,7 +237,7 @@ def _versions() -> dict[str, Any]:
     return versions
 
 
-def _git_commit() -> str | None:
+def git_commit() -> str | None:
     """The commit of this project's source tree; none if it is installed from elsewhere."""
     source = Path(__file__).resolve().parents[1]
     try:

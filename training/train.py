@@ -1,8 +1,10 @@
-"""Trains a policy into a run folder of its own."""
+"""Trains a policy into a run folder of its own, or goes on with a run."""
 
 import dataclasses
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from stable_baselines3.her import HerReplayBuffer
 
@@ -21,6 +24,9 @@ from training.checkpoint import PeriodicCheckpoint, save_checkpoint
 from training.config import PPOConfig, SACConfig, TrainConfig
 from training.environments import make_vector_env
 from training.errors import UsageError
+from training.export import policy_file_of
+from training.learning_curve import continued_logger
+from training.model_state import read_state, restore
 from training.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.run_folder import RunFolder, create_run_folder
 from training.vec_env import RigidVecEnv
@@ -38,8 +44,10 @@ class TrainResult:
     """Where it is kept."""
     steps: int
     """Environment steps taken, summed over worlds."""
+    steps_before: int
+    """Those that a run had taken before it was resumed; 0 for one that was not."""
     seconds: float
-    """Wall time of training, in seconds."""
+    """Wall time of training since it began or was resumed, in seconds."""
     environment_share: float
     """Share of that time spent in the environments."""
     success_rate: float | None
@@ -79,44 +87,138 @@ def train(
         quiet: Show no progress.
 
     Raises:
-        UsageError: The environment refuses its arguments, or the device does not exist.
+        UsageError: The environment refuses its arguments, the device does not exist, or the disk is
+            full; the last checkpoint stays then.
     """
-    torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
     seed = config.seed if config.seed is not None else int(np.random.default_rng().integers(2**31))
     config = dataclasses.replace(config, seed=seed)
+    with _worlds_and_model(config, device, num_threads) as (worlds, model):
+        policy_file_of(model, config).to_bytes()  # what can't be kept is not worth training
+        folder = create_run_folder(log_folder, config)
+        with folder.claimed():
+            with _naming_full_disks(folder):
+                model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
+            return _learn(model, worlds, folder, config, save_every, quiet)
+
+
+def resume(
+    folder: RunFolder,
+    *,
+    device: str = "cpu",
+    num_threads: int | None = None,
+    save_every: int | None = None,
+    quiet: bool = False,
+) -> TrainResult:
+    """Goes on with a run from its last checkpoint, up to the steps that it was made for.
+
+    Nothing is unpickled. The worlds begin new episodes, so a run that was resumed is not to the
+    bit what it would have been.
+
+    Args:
+        folder: A run whose process has ended before its time.
+        device: Torch device of the networks.
+        num_threads: As of `train`.
+        save_every: As of `train`.
+        quiet: Show no progress.
+
+    Raises:
+        UsageError: The folder holds no run, no checkpoint or a damaged one, the run is finished,
+            or another process is training it.
+    """
+    config = folder.config()
+    with folder.claimed():
+        found = folder.checkpoints()
+        if not found:
+            raise UsageError(
+                f"{folder.path} holds no checkpoint to resume from: the run ended before its "
+                "first one; train anew"
+            )
+        checkpoint = max(found)[1]
+        with _worlds_and_model(config, device, num_threads) as (worlds, model):
+            try:
+                state = read_state(checkpoint)
+                restore(model, checkpoint)
+                seconds, finished = float(state["seconds"]), bool(state["finished"])
+            except Exception as error:  # whatever a damaged file makes its reader raise
+                raise UsageError(f"{checkpoint} is damaged: {error}") from error
+            if finished or model.num_timesteps >= config.n_timesteps:
+                raise UsageError(
+                    f"{folder.path} is finished, after {model.num_timesteps:,} steps: "
+                    "nothing to resume"
+                )
+            folder.note_resumption(model.num_timesteps)
+            with _naming_full_disks(folder):
+                model.set_logger(continued_logger(folder, checkpoint, state))
+            return _learn(model, worlds, folder, config, save_every, quiet, seconds)
+
+
+def _learn(
+    model: BaseAlgorithm,
+    worlds: RigidVecEnv,
+    folder: RunFolder,
+    config: TrainConfig,
+    save_every: int | None,
+    quiet: bool,
+    seconds_before: float = 0.0,
+) -> TrainResult:
+    """Takes the steps that are left, with checkpoints on the way and at the end."""
+    steps_before, start = model.num_timesteps, time.perf_counter()
+
+    def save(finished: bool = False) -> None:
+        seconds = seconds_before + time.perf_counter() - start
+        save_checkpoint(model, folder, config, seconds=seconds, finished=finished)
+
+    checkpoints = PeriodicCheckpoint(save_every or max(config.n_timesteps // 10, 1), save)
+    progress = TrainingProgress(config.n_timesteps, quiet, seconds_before)
+    callbacks: list[BaseCallback] = [checkpoints, progress]
+    if isinstance(config, PPOConfig):
+        callbacks.append(BatchedTimeoutBootstrap())
+    if config.target_success_rate is not None:
+        callbacks.append(StopAtSuccess(config.target_success_rate))
+    interrupted = False
+    try:
+        left = config.n_timesteps - steps_before
+        with _naming_full_disks(folder):
+            model.learn(left, callback=callbacks, reset_num_timesteps=steps_before == 0)
+    except KeyboardInterrupt:
+        interrupted = True
+        if isinstance(model, OnPolicyAlgorithm) and checkpoints.rollout_from is not None:
+            # no update has learned from the steps since, and none will
+            model.num_timesteps = checkpoints.rollout_from
+    finally:
+        progress.close()
+    seconds = time.perf_counter() - start
+    save(finished=not interrupted)
+    with _naming_full_disks(folder):
+        model.logger.close()
+    return TrainResult(
+        folder=folder,
+        steps=model.num_timesteps,
+        steps_before=steps_before,
+        seconds=seconds,
+        environment_share=worlds.seconds_in_envs / seconds,
+        success_rate=success_rate(model),
+        interrupted=interrupted,
+    )
+
+
+@contextmanager
+def _naming_full_disks(folder: RunFolder) -> Iterator[None]:
+    """Makes a UsageError of what the system refuses, as to write the learning curve."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"training stopped in {folder.path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def _worlds_and_model(
+    config: TrainConfig, device: str, num_threads: int | None
+) -> Iterator[tuple[RigidVecEnv, BaseAlgorithm]]:
+    torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
     worlds = RigidVecEnv(make_vector_env(config.env_id, config.n_envs, **config.env_kwargs))
     try:
-        model = _build(config, _wrapped(worlds, config), _checked(device))
-        folder = create_run_folder(log_folder, config)
-        model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
-        progress = TrainingProgress(config.n_timesteps, quiet)
-        callbacks: list[BaseCallback] = [
-            PeriodicCheckpoint(folder, save_every or max(config.n_timesteps // 10, 1)),
-            progress,
-        ]
-        if isinstance(config, PPOConfig):
-            callbacks.append(BatchedTimeoutBootstrap())
-        if config.target_success_rate is not None:
-            callbacks.append(StopAtSuccess(config.target_success_rate))
-        start = time.perf_counter()
-        interrupted = False
-        try:
-            model.learn(config.n_timesteps, callback=callbacks)
-        except KeyboardInterrupt:
-            interrupted = True
-        finally:
-            progress.close()
-        seconds = time.perf_counter() - start
-        save_checkpoint(model, folder)
-        model.logger.close()
-        return TrainResult(
-            folder=folder,
-            steps=model.num_timesteps,
-            seconds=seconds,
-            environment_share=worlds.seconds_in_envs / seconds,
-            success_rate=success_rate(model),
-            interrupted=interrupted,
-        )
+        yield worlds, _build(config, _wrapped(worlds, config), _checked(device))
     finally:
         worlds.close()
 

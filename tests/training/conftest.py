@@ -4,7 +4,7 @@ import gymnasium as gym
 import pytest
 
 from tests.training.reach import ReachEnv, ReachVectorEnv
-from training.config import PPOConfig
+from training.config import PPOConfig, SACConfig
 
 REACH = "Test/Reach-v0"
 
@@ -31,6 +31,25 @@ def quick_ppo(reach: str) -> PPOConfig:
         seed=3,
         env_kwargs={"reward_type": "dense"},
         policy_kwargs={"net_arch": [8], "activation": "tanh"},
+    )
+
+
+@pytest.fixture
+def quick_sac(reach: str) -> SACConfig:
+    """A hundred short updates of a small network, with hindsight."""
+    return SACConfig(
+        env_id=reach,
+        n_envs=4,
+        n_timesteps=200,
+        batch_size=32,
+        buffer_size=1000,
+        learning_starts=80,
+        train_freq=2,
+        seed=3,
+        env_kwargs={"reward_type": "sparse"},
+        policy_kwargs={"net_arch": [8], "activation": "relu"},
+        replay_buffer_class="HerReplayBuffer",
+        replay_buffer_kwargs={"n_sampled_goal": 4, "goal_selection_strategy": "future"},
     )
 
 

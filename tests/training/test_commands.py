@@ -33,8 +33,12 @@ def test_evaluate_finds_the_latest_run(trained, capsys):
 
 def test_evaluate_takes_a_folder_a_model_and_other_arguments(trained, tmp_path, capsys):
     folder = tmp_path / "ppo" / "Test-Reach-v0_1"
-    assert cli.main(["evaluate", str(folder), "-n", "5", "--stochastic"]) == 0
-    assert cli.main(["evaluate", str(folder / "model.zip"), "-n", "5", "--seed", "4"]) == 0
+    trusted = ["-n", "5", "--trust-pickle"]
+    assert cli.main(["evaluate", str(folder), *trusted, "--stochastic"]) == 0
+    assert (
+        cli.main(["evaluate", str(folder / "checkpoint_2" / "model.zip"), *trusted, "--seed", "4"])
+        == 0
+    )
     assert cli.main(["evaluate", str(folder), "-n", "5", "--env-kwargs", "reward_type:sparse"]) == 0
     assert "-10.000" in capsys.readouterr().out
 

@@ -7,9 +7,10 @@ from training import evaluate as evaluate_module
 from training import policy as policy_module
 from training.errors import UsageError
 from training.evaluate import evaluate, print_evaluation, wilson_interval
-from training.policy import Policy, scripted_policy, trained_policy
+from training.policy import Policy, scripted_policy
 from training.record import record
 from training.train import train
+from training.trained_policy import trained_policy
 
 
 @pytest.fixture
@@ -118,7 +119,7 @@ def test_a_trained_policy_is_evaluated_as_it_was_trained(quick_ppo, tmp_path):
     assert policy.env_kwargs == {"reward_type": "dense"}
     first, second = (evaluate(policy, 20, quiet=True) for _ in range(2))
     np.testing.assert_array_equal(first.episode_return, second.episode_return)
-    beside = trained_policy(folder.model)
+    beside = trained_policy(folder.model, trust_pickle=True)
     assert evaluate(beside, 20, quiet=True).episode_return == pytest.approx(first.episode_return)
 
 
@@ -127,12 +128,13 @@ def test_a_model_alone_needs_algorithm_and_environment(quick_ppo, tmp_path, reac
     alone = tmp_path / "alone.zip"
     folder.model.rename(alone)
     with pytest.raises(UsageError, match="say --algo and --env"):
-        trained_policy(alone)
-    assert trained_policy(alone, algo="ppo", env_id=reach).env_id == reach
+        trained_policy(alone, trust_pickle=True)
+    trusted = trained_policy(alone, algo="ppo", env_id=reach, trust_pickle=True)
+    assert trusted.env_id == reach
     with pytest.raises(UsageError, match="did you mean 'ppo'"):
         trained_policy(alone, algo="ppq", env_id=reach)
     with pytest.raises(UsageError, match=r"model\.zip is missing"):
-        trained_policy(folder.path)
+        trained_policy(folder.path, deterministic=False)
 
 
 def test_files_that_are_no_policies_are_named(quick_ppo, tmp_path):
@@ -143,7 +145,7 @@ def test_files_that_are_no_policies_are_named(quick_ppo, tmp_path):
         trained_policy(folder.path, algo="sac")
     folder.model.write_bytes(b"no zip")
     with pytest.raises(UsageError, match="cannot be read as a policy of ppo"):
-        trained_policy(folder.path)
+        trained_policy(folder.model, trust_pickle=True)
 
 
 def test_film_and_still_are_written(solver, tmp_path):

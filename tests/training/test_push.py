@@ -10,9 +10,10 @@ from training.config import load_config
 from training.environments import make_vector_env
 from training.evaluate import evaluate
 from training.plot import plot_learning_curve
-from training.policy import scripted_policy, trained_policy
+from training.policy import scripted_policy
 from training.record import record
 from training.train import train
+from training.trained_policy import trained_policy
 from training.vec_env import RigidVecEnv
 
 PUSH = "RigidEnvs/Push-v0"

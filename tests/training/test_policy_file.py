@@ -1,0 +1,302 @@
+"""Policy files: they act as Stable-Baselines3 does, and nothing but what was written is read."""
+
+import base64
+import hashlib
+import json
+import pickle
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.training.reach import ReachVectorEnv
+from training import cli
+from training.config import ALGORITHMS, PACKAGED, _read_yaml, load_config
+from training.errors import UsageError
+from training.evaluate import evaluate
+from training.policy_file import load_policy_file, read_policy
+from training.train import train
+from training.trained_policy import trained_policy
+
+KEYS = ("observation", "achieved_goal", "desired_goal")
+
+
+def observations(count: int = 200, scale: float = 2.0) -> dict[str, np.ndarray]:
+    random = np.random.default_rng(0)
+    return {key: random.normal(0, scale, (count, 2)).astype(np.float32) for key in KEYS}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> Path:
+    """A policy file of PPO with statistics."""
+    config = load_config("ppo", "RigidEnvs/Push-v0").as_mapping() | {
+        "n_envs": 8,
+        "n_timesteps": 160,
+        "n_steps": 10,
+        "batch_size": 40,
+        "target_success_rate": None,
+        "env_kwargs": {"reward_type": "dense"},
+    }
+    config = ALGORITHMS["ppo"].from_mapping("Test/Reach-v0", config, "test")
+    return train(config, tmp_path_factory.mktemp("runs"), quiet=True).folder.policy
+
+
+def rewritten(path: Path, tmp_path: Path, numbers: bytes = b"", **changes) -> Path:
+    """The file with another header, or more numbers, under a checksum that fits."""
+    first, _, body = path.read_bytes().split(b"\n", 2)
+    text, _, rest = body.partition(b"\0")
+    header = json.loads(text)
+    for name, value in changes.items():
+        at = header
+        *groups, last = name.split("__")
+        for group in groups:
+            at = at[group]
+        at[last] = value
+    body = json.dumps(header).encode() + b"\0" + rest + numbers
+    digest = hashlib.sha256(body).hexdigest().encode()
+    changed = tmp_path / "changed.policy"
+    changed.write_bytes(b"\n".join([first, digest, body]))
+    return changed
+
+
+@pytest.mark.parametrize("normalize", [False, True])
+@pytest.mark.parametrize("activation", ["tanh", "relu", "elu"])
+def test_a_file_acts_as_ppo_does(quick_ppo, tmp_path, normalize, activation):
+    network = {"net_arch": [16, 8], "activation": activation, "log_std_init": 0.0}
+    config = quick_ppo.replace(normalize=normalize, policy_kwargs=network, learning_rate=0.05)
+    folder = train(config, tmp_path, quiet=True).folder
+    expected = trained_policy(folder.model, trust_pickle=True)
+    # far enough to be clipped nearly everywhere, or as far as float32 carries six digits
+    for scale in (0.3, 50.0 if normalize else 2.0):
+        action = read_policy(folder.policy).act(observations(scale=scale))
+        assert action.dtype == np.float32
+        np.testing.assert_allclose(action, expected.act(observations(scale=scale)), atol=1e-6)
+
+
+@pytest.mark.parametrize("normalize", [False, True])
+def test_a_file_acts_as_sac_does(quick_sac, tmp_path, normalize, monkeypatch):
+    monkeypatch.setattr(ReachVectorEnv, "__init__", with_lopsided_actions(ReachVectorEnv.__init__))
+    folder = train(quick_sac.replace(normalize=normalize), tmp_path, quiet=True).folder
+    action = read_policy(folder.policy).act(observations())
+    expected = trained_policy(folder.model, trust_pickle=True).act(observations())
+    np.testing.assert_allclose(action, expected, rtol=1e-6, atol=1e-6)
+
+
+def with_lopsided_actions(init):
+    """Bounds of actions that are not ±1: a squashed output must be stretched to them."""
+
+    def made(self, *args, **kwargs):
+        init(self, *args, **kwargs)
+        low, high = np.float32([-0.5, -2.0]), np.float32([0.25, 3.0])
+        self.single_action_space = gym.spaces.Box(low, high)
+
+    return made
+
+
+def test_an_action_does_not_depend_on_how_many_worlds_act(kept):
+    policy, all_of_them = read_policy(kept), observations()
+    together = policy.act(all_of_them)
+    alone = [policy.act({k: v[i : i + 1] for k, v in all_of_them.items()})[0] for i in range(50)]
+    np.testing.assert_allclose(alone, together[:50], atol=1e-7)
+
+
+def test_reading_takes_neither_torch_nor_stable_baselines(kept):
+    code = (
+        "import sys; from pathlib import Path; from training.policy_file import load_policy_file;"
+        "load_policy_file(Path(sys.argv[1]));"
+        "sys.exit(any(name in sys.modules for name in ('torch', 'stable_baselines3')))"
+    )
+    words = [sys.executable, "-c", code, str(kept)]
+    assert subprocess.run(words, cwd=Path(__file__).parents[2]).returncode == 0
+
+
+def test_the_header_says_what_was_trained(kept):
+    header = load_policy_file(kept).header
+    assert header.algorithm == "ppo"
+    assert header.environment.id == "Test/Reach-v0"
+    assert header.environment.version == 0
+    assert header.environment.kwargs == {"reward_type": "dense"}
+    assert header.observation == dict.fromkeys(sorted(KEYS), (2,))
+    assert header.network.widths == [6, 64, 64, 2]
+    assert (header.steps, header.seed, header.success) == (160, 0, None)
+    assert header.versions["torch"]
+    assert b'"algorithm": "ppo"' in kept.read_bytes()[:200]
+
+
+def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
+    for algo, kind in ALGORITHMS.items():
+        for env_id in _read_yaml(PACKAGED / f"{algo}.yaml", algo):
+            network = load_config(algo, env_id).policy_kwargs
+            short = {"n_timesteps": 16, "policy_kwargs": network, "normalize": True}
+            if algo == "ppo":
+                short |= {"n_steps": 16, "batch_size": 16}
+            folder = train(kind.from_mapping(reach, short, "test"), tmp_path, quiet=True).folder
+            assert folder.policy.stat().st_size < 300_000
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.data())
+def test_any_byte_that_is_another_is_refused(kept, tmp_path, data):
+    whole = kept.read_bytes()
+    if data.draw(st.booleans()):
+        damaged = whole[: data.draw(st.integers(0, len(whole) - 1))]
+    else:
+        place = data.draw(st.integers(0, len(whole) - 1) | st.integers(0, 1000))
+        other = whole[place] ^ data.draw(st.integers(1, 255))
+        damaged = whole[:place] + bytes([other]) + whole[place + 1 :]
+    damaged += data.draw(st.just(b"") | st.binary(max_size=3)) if len(damaged) < len(whole) else b""
+    path = tmp_path / "damaged.policy"
+    path.write_bytes(damaged)
+    if damaged != whole:
+        with pytest.raises(UsageError):
+            load_policy_file(path)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=5,
+)
+FIELDS = ["algorithm", "environment", "observation", "network", "normalization", "success", "seed"]
+FIELDS += ["steps", "commit", "versions", "environment__id", "network__widths", "network__low"]
+FIELDS += ["network__activation", "normalization__keys", "normalization__clip"]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(field=st.sampled_from(FIELDS), value=JSON)
+def test_a_header_that_was_made_up_is_refused_or_acts(kept, tmp_path, field, value):
+    try:
+        policy = read_policy(rewritten(kept, tmp_path, **{field: value}))
+    except UsageError:
+        return
+    assert policy.act(observations()).shape == (200, 2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"algorithm": "td4"}, "algorithm is 'td4', should be ppo or sac"),
+        ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
+        ({"network__squashing": "tanh"}, "squashing is 'tanh', should be clip"),
+        ({"network__widths": [6, 64, 32, 2]}, "bytes of numbers"),
+        ({"network__widths": [7, 64, 64, 2]}, "begins with 7, should be 6"),
+        ({"network__widths": [6, 2**40, 2**40, 2]}, "bytes of numbers"),
+        ({"network__low": [-1.0]}, "network.low has 1 entries, should have 2"),
+        ({"observation": {"observation": [6]}}, "should be observation"),
+        ({"environment__version": 1}, "version is 1, but environment.id"),
+        ({"normalization__clip": -1}, "should be above 0"),
+        ({"colour": "red"}, "at odds: colour"),
+        ({"numbers": b"1234"}, "bytes of numbers"),
+    ],
+)
+def test_headers_that_cannot_be_are_named(kept, tmp_path, changes, message):
+    with pytest.raises(UsageError, match=message):
+        read_policy(rewritten(kept, tmp_path, **changes))
+
+
+def test_other_files_are_named(kept, tmp_path):
+    path = tmp_path / "some.policy"
+    with pytest.raises(UsageError, match="does not exist"):
+        trained_policy(path)
+    with pytest.raises(UsageError, match="No such file"):
+        read_policy(path)
+    path.write_bytes(b"PK\x03\x04")
+    with pytest.raises(UsageError, match="is no policy file"):
+        read_policy(path)
+    path.write_bytes(kept.read_bytes().replace(b"policy 1\n", b"policy 2\n", 1))
+    with pytest.raises(UsageError, match="has version '2' of the format, should be 1"):
+        read_policy(path)
+
+
+def test_another_version_of_the_environment_is_named(kept, tmp_path):
+    other = {"id": "Test/Reach-v7", "version": 7, "kwargs": {}}
+    path = rewritten(kept, tmp_path, environment=other)
+    with pytest.raises(UsageError, match="trained on Test/Reach-v7, installed is Test/Reach-v0"):
+        read_policy(path)
+    assert read_policy(path, env_id="Test/Reach-v0").env_id == "Test/Reach-v0"
+
+
+def test_no_module_is_imported_that_a_file_names(kept, tmp_path, monkeypatch):
+    (tmp_path / "intruder.py").write_text("raise AssertionError('imported')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    other = {"id": "intruder:RigidEnvs/Posh-v0", "version": 0, "kwargs": {}}
+    with pytest.raises(UsageError, match="not installed; did you mean --env RigidEnvs/Push-v0"):
+        read_policy(rewritten(kept, tmp_path, environment=other))
+
+
+def test_a_policy_that_has_diverged_is_not_written(kept):
+    content = load_policy_file(kept)
+    content.layers[0] = (content.layers[0][0] * np.float32(np.nan), content.layers[0][1])
+    with pytest.raises(UsageError, match="training has diverged"):
+        content.to_bytes()
+
+
+def test_an_environment_that_is_shown_otherwise_is_named(kept):
+    with pytest.raises(UsageError, match=r"the environment's are \{'observation': "):
+        read_policy(kept).act({"observation": np.zeros((1, 3), np.float32)})
+
+
+def test_arguments_in_a_file_cannot_clash_with_our_own(kept, tmp_path):
+    for name in ("env_id", "num_envs", "autoreset_mode"):
+        kwargs = {"id": "Test/Reach-v0", "version": 0, "kwargs": {name: 3}}
+        with pytest.raises(UsageError, match="refuses"):
+            evaluate(read_policy(rewritten(kept, tmp_path, environment=kwargs)), 1, quiet=True)
+
+
+class Intruder:
+    """Creates a file when it is unpickled."""
+
+    def __init__(self, trace: Path):
+        self.trace = trace
+
+    def __reduce__(self):
+        return Path.touch, (self.trace,)
+
+
+def test_nothing_is_unpickled_without_leave(quick_ppo, tmp_path, capsys):
+    folder = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True).folder
+    trace = tmp_path / "trace"
+    trap = pickle.dumps(Intruder(trace))
+    folder.normalization.write_bytes(trap)
+    with zipfile.ZipFile(folder.model, "w") as model:  # as Stable-Baselines3 packs objects
+        packed = {":type:": "x", ":serialized:": base64.b64encode(trap).decode()}
+        model.writestr("data", json.dumps({"policy_class": packed}))
+    run, elsewhere = str(folder.path), str(tmp_path / "other.policy")
+    Path(elsewhere).write_bytes(folder.model.read_bytes())
+    for word in (run, str(folder.policy)):
+        assert cli.main(["evaluate", word, "-n", "2"]) == 0
+    for words in ([str(folder.model)], [elsewhere], [run, "--stochastic"]):
+        assert cli.main(["evaluate", *words, "-n", "2"]) == 2
+        assert cli.main(["record", *words, "-n", "1"]) == 2
+    assert "--trust-pickle" in capsys.readouterr().err
+    folder.policy.unlink()
+    assert cli.main(["evaluate", run, "-n", "2"]) == 2
+    assert not trace.exists()
+    cli.main(["evaluate", str(folder.model), "-n", "2", "--trust-pickle"])
+    assert trace.exists()  # the trap works
+
+
+def test_export_copies_a_policy_out_of_its_run(quick_ppo, tmp_path, capsys):
+    folder = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True).folder
+    out = tmp_path / "shared" / "reach.policy"
+    assert cli.main(["export", str(folder.path), "-o", str(out), "-n", "20", "--sb3"]) == 0
+    assert {path.name for path in out.parent.iterdir()} == {
+        "reach.policy",
+        "reach.zip",
+        "reach.pkl",
+    }
+    success = load_policy_file(out).header.success
+    assert (success.episodes, success.fidelity) == (20, None)
+    assert cli.main(["evaluate", str(out), "-n", "20"]) == 0
+    assert f"{success.rate:.1%}" in capsys.readouterr().out
+    assert cli.main(["record", str(out), "-n", "1"]) == 0
+    assert out.with_suffix(".mp4").exists()
+    assert cli.main(["export", str(folder.path), "-o", str(tmp_path / "x.zip")]) == 2
+    assert "should end in .policy" in capsys.readouterr().err
+    assert cli.main(["export", str(tmp_path)]) == 2

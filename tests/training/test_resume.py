@@ -1,0 +1,308 @@
+"""Runs that end before their time go on from their last checkpoint, whatever ended them."""
+
+import csv
+import errno
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import CSVOutputFormat
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from training import checkpoint as checkpoint_module
+from training import cli
+from training import train as train_module
+from training.errors import UsageError
+from training.model_state import read_state
+from training.plot import read_learning_curve
+from training.policy_file import load_policy_file, read_policy
+from training.progress import TrainingProgress
+from training.run_folder import RunFolder
+from training.train import resume, train
+
+KILLED = """
+import sys
+from pathlib import Path
+import tests.training.conftest
+from training.config import load_config
+from training.train import train
+config = load_config(sys.argv[1], "Test/Reach-v0", Path(sys.argv[2]))
+train(config, Path(sys.argv[3]), save_every=1, quiet=True)
+"""
+
+
+def stopping(monkeypatch, after: int, error: BaseException) -> None:
+    """Makes training fail once it has taken more than that many steps."""
+
+    class Stop(BaseCallback):
+        def _on_step(self) -> bool:
+            if self.num_timesteps > after:
+                raise error
+            return True
+
+    monkeypatch.setattr(train_module, "TrainingProgress", with_stop(Stop))
+
+
+def with_stop(stop: type[BaseCallback]):
+    """The progress display, which fails too."""
+
+    class Both(TrainingProgress):
+        def _on_step(self) -> bool:
+            return super()._on_step() and stop._on_step(self)
+
+    return Both
+
+
+def steps_in_tensorboard(folder: RunFolder) -> list[int]:
+    events = EventAccumulator(str(folder.path)).Reload()
+    return [event.step for event in events.Scalars("rollout/ep_rew_mean")]
+
+
+def steps_of(folder: RunFolder) -> list[int]:
+    """Steps of each row of the learning curve, of which each must have as many cells."""
+    with folder.progress.open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert {len(row) for row in rows} == {len(rows[0])}
+    return [int(row[rows[0].index("time/total_timesteps")]) for row in rows[1:]]
+
+
+def interrupted(config, tmp_path, monkeypatch, after, error=KeyboardInterrupt) -> RunFolder:
+    with monkeypatch.context() as patched:
+        stopping(patched, after, error())
+        try:
+            return train(config, tmp_path, save_every=80, quiet=True).folder
+        except RuntimeError:
+            return RunFolder(tmp_path / config.algo / "Test-Reach-v0_1")
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+@pytest.mark.parametrize("normalize", [False, True])
+def test_ppo_goes_on_to_the_steps_it_was_made_for(
+    quick_ppo, tmp_path, monkeypatch, error, normalize
+):
+    config = quick_ppo.replace(n_timesteps=400, normalize=normalize, learning_rate="lin_1e-3")
+    folder = interrupted(config, tmp_path, monkeypatch, 200, error)
+    before = read_learning_curve(folder)
+    result = resume(folder, quiet=True)
+    assert (result.steps, result.steps_before) == (400, 160)
+    assert steps_of(folder) == [80, 160, 240, 320, 400]
+    assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
+    after = read_learning_curve(folder)
+    assert after[:2] == before[:2]
+    seconds = [row["time/wall_time"] for row in after]
+    assert seconds == sorted(seconds)
+    with folder.progress.open() as file:
+        rates = [float(row["train/learning_rate"]) for row in list(csv.DictReader(file))[1:]]
+    assert rates == pytest.approx([8e-4, 6e-4, 4e-4, 2e-4])  # as if nothing had happened
+    assert len(json.loads((folder.path / "run.json").read_text())["resumed"]) == 1
+    assert len(folder.checkpoints()) == 1
+
+
+@pytest.mark.parametrize("hindsight", [True, False])
+def test_sac_goes_on_with_its_replay_buffer(quick_sac, tmp_path, monkeypatch, hindsight):
+    if not hindsight:
+        quick_sac = quick_sac.replace(replay_buffer_class=None, replay_buffer_kwargs={})
+    config = quick_sac.replace(n_timesteps=400, buffer_size=200)
+    folder = interrupted(config, tmp_path, monkeypatch, 240)
+    models = []
+    monkeypatch.setattr(train_module, "_learn", lambda model, *_: models.append(model))
+    resume(folder)
+    with np.load(folder.checkpoint / "replay.npz") as kept:
+        assert kept["full"]
+        np.testing.assert_array_equal(models[0].replay_buffer.actions, kept["actions"])
+    monkeypatch.undo()
+    result = resume(folder, quiet=True)
+    # a rollout takes 8 steps, and Ctrl-C came after 4 of one
+    assert result.steps == 404
+    assert steps_of(folder) == sorted(set(steps_of(folder)))
+
+
+def test_a_model_is_restored_whole(quick_ppo, tmp_path, monkeypatch):
+    config = quick_ppo.replace(n_timesteps=400, normalize=True)
+    kept = []
+    save = checkpoint_module.state_files
+    monkeypatch.setattr(
+        checkpoint_module,
+        "state_files",
+        lambda model, notes: kept.append((model, mean_of(model).copy())) or save(model, notes),
+    )
+    folder = interrupted(config, tmp_path, monkeypatch, 200)
+    state, (before, mean) = read_state(folder.checkpoint), kept[-1]
+    found = []
+    monkeypatch.setattr(train_module, "_learn", lambda model, *_: found.append(drawn(model)))
+    for _ in range(2):
+        resume(folder)
+    assert found[0][2:] == found[1][2:]
+    model = found[0][0]
+    assert model.num_timesteps == state["steps"] == 160
+    assert model._n_updates == before._n_updates
+    assert list(model.ep_success_buffer) == list(before.ep_success_buffer)[: state["steps"]]
+    for name, parameter in before.policy.state_dict().items():
+        torch.testing.assert_close(model.policy.state_dict()[name], parameter, rtol=0, atol=0)
+    moments = [
+        list(one.policy.optimizer.state_dict()["state"][0].values()) for one in (model, before)
+    ]
+    for ours, theirs in zip(*moments, strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=0, atol=0)
+    np.testing.assert_array_equal(found[0][1], mean)
+
+
+def mean_of(model) -> np.ndarray:
+    return model.get_vec_normalize_env().obs_rms["observation"].mean
+
+
+def drawn(model) -> tuple:
+    """The model, its statistics, and the next number of each generator."""
+    mean = mean_of(model).copy()
+    numbers = (random.random(), np.random.random(), float(torch.rand(1)))  # noqa: NPY002
+    first = model.env.reset()["desired_goal"][0, 0]
+    return model, mean, *numbers, float(model.action_space.sample()[0]), float(first)
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_a_run_that_is_killed_at_any_moment_goes_on(
+    algo, quick_ppo, quick_sac, tmp_path, write_yaml
+):
+    config = {"ppo": quick_ppo, "sac": quick_sac}[algo].replace(n_timesteps=1_000_000)
+    settings = write_yaml(config.as_yaml())
+    folder = RunFolder(tmp_path / algo / "Test-Reach-v0_1")
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, algo, str(settings), str(tmp_path)],
+        cwd=Path(__file__).parents[2],
+    )
+    rng = random.Random(algo)
+    try:
+        deadline = time.monotonic() + 120
+        while not (folder.path.exists() and folder.checkpoints()):
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        with pytest.raises(UsageError, match="is being trained by another process"):
+            resume(folder)
+        for _ in range(10):  # what a kill at each of these moments would leave behind
+            process.send_signal(signal.SIGSTOP)
+            os.waitpid(process.pid, os.WUNTRACED)  # until it has stopped
+            state = read_state(folder.checkpoint)
+            assert load_policy_file(folder.policy).header.steps == state["steps"]
+            process.send_signal(signal.SIGCONT)
+            time.sleep(rng.uniform(0, 0.05))
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    # as many steps are left as take a moment
+    steps = read_state(folder.checkpoint)["steps"]
+    shorter = folder.config().replace(n_timesteps=steps + 160)
+    (folder.path / "config.yaml").write_text(shorter.as_yaml())
+    result = resume(folder, quiet=True)
+    assert result.steps_before == steps
+    assert result.steps >= steps + 160
+    assert steps_of(folder) == sorted(set(steps_of(folder)))
+    assert not list(folder.path.glob("*.tmp"))
+
+
+def full_disk(*_args, **_kwargs):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("file", ["policy.policy", "tensors.pt", "model.zip", "progress.csv"])
+def test_a_full_disk_leaves_the_last_checkpoint_whole(quick_ppo, tmp_path, monkeypatch, file):
+    write, seen = checkpoint_module._write, []
+
+    def write_until_full(path, content):
+        seen.append(path.name)
+        if path.name == file and seen.count(file) == 2:
+            path.write_bytes(b"half")
+            full_disk()
+        write(path, content)
+
+    config = quick_ppo.replace(n_timesteps=400)
+    with monkeypatch.context() as patched:
+        patched.setattr(checkpoint_module, "_write", write_until_full)
+        with pytest.raises(UsageError, match="No space left on device; the one before is whole"):
+            train(config, tmp_path, save_every=1, quiet=True)
+    folder = RunFolder(tmp_path / "ppo" / "Test-Reach-v0_1")
+    assert [number for number, _ in folder.checkpoints()] == [1]
+    assert not list(folder.path.glob("*.tmp"))
+    read_policy(folder.policy)
+    assert resume(folder, quiet=True).steps == 400
+
+
+def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path, monkeypatch):
+    write = CSVOutputFormat.write
+
+    def write_until_full(self, values, excluded, step=0):
+        if step > 200:
+            self.file.write("24")
+            self.file.flush()
+            full_disk()
+        write(self, values, excluded, step)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(CSVOutputFormat, "write", write_until_full)
+        with pytest.raises(UsageError, match=r"training stopped in .*: No space left on device"):
+            train(quick_ppo.replace(n_timesteps=400), tmp_path, save_every=1, quiet=True)
+    folder = RunFolder(tmp_path / "ppo" / "Test-Reach-v0_1")
+    with monkeypatch.context() as patched:
+        patched.setattr("training.learning_curve.shutil.copyfile", full_disk)
+        with pytest.raises(UsageError, match=r"training stopped in .*: No space left on device"):
+            resume(folder, quiet=True)
+    assert resume(folder, quiet=True).steps == 400
+    assert steps_of(folder) == [80, 160, 240, 320, 400]
+    assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
+
+
+def test_what_cannot_be_resumed_is_named(quick_ppo, tmp_path, monkeypatch):
+    with pytest.raises(UsageError, match=r"run\.json is missing"):
+        resume(RunFolder(tmp_path / "nothing"))
+    finished = train(quick_ppo, tmp_path, quiet=True).folder
+    with pytest.raises(UsageError, match="is finished, after 160 steps"):
+        resume(finished)
+    config = quick_ppo.replace(n_timesteps=400)
+    with monkeypatch.context() as patched:
+        stopping(patched, 100, RuntimeError())
+        with pytest.raises(RuntimeError):
+            train(config, tmp_path, save_every=300, quiet=True)
+    with pytest.raises(UsageError, match="holds no checkpoint to resume from"):
+        resume(RunFolder(tmp_path / "ppo" / "Test-Reach-v0_2"))
+
+
+@pytest.mark.parametrize("name", ["state.json", "tensors.pt"])
+@pytest.mark.parametrize("damage", ["missing", "cut", "foreign"])
+def test_damaged_checkpoints_are_named(quick_ppo, tmp_path, monkeypatch, name, damage):
+    folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
+    file = folder.checkpoint / name
+    content = file.read_bytes()
+    file.unlink()
+    if damage != "missing":
+        file.write_bytes(content[: len(content) // 2] if damage == "cut" else b"{}")
+    with pytest.raises(UsageError, match="checkpoint_3 is damaged"):
+        resume(folder)
+
+
+def test_the_command_resumes_and_refuses_what_contradicts(quick_ppo, tmp_path, monkeypatch, capsys):
+    folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
+    words = ["train", "--resume", str(folder.path)]
+    for flags, message in (
+        (["--algo", "sac"], "--algo is 'sac'"),
+        (["--env", "RigidEnvs/Push-v0"], "--env is 'RigidEnvs/Push-v0'"),
+        (["--config", "other.yaml"], "--config does not go with --resume"),
+        (["--seed", "4"], "seed is asked to be 4, but"),
+        (["-n", "500"], "n_timesteps is asked to be 500"),
+        (["--hyperparams", "gamma:0.5"], "gamma is asked to be 0.5"),
+        (["--env-kwargs", "reward_type:sparse"], "env_kwargs is asked"),
+        (["--fidelity", "fast"], "env_kwargs is asked"),
+    ):
+        assert cli.main([*words, *flags]) == 2
+        assert message in capsys.readouterr().err
+    assert cli.main([*words, "--algo", "ppo", "--seed", "3", "-n", "400"]) == 0
+    assert "trained after 400 steps" in capsys.readouterr().out
+    assert [path.name for path in (tmp_path / "ppo").iterdir()] == ["Test-Reach-v0_1"]

@@ -1,0 +1,250 @@
+"""The header of a policy file: its fields, and a reader that believes nothing."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+SQUASHING = {"ppo": "clip", "sac": "tanh"}
+"""By algorithm, how the network's output becomes an action: cut to its bounds, or tanh."""
+ACTIVATION_NAMES = ("tanh", "relu", "elu")
+
+
+class Misfit(ValueError):
+    """A header that cannot be; the message names the field and what would be right."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """What the policy was trained on."""
+
+    id: str
+    """Environment id, as in RigidEnvs/Push-v0."""
+    version: int
+    """The number behind its -v: another one behaves otherwise."""
+    kwargs: dict[str, Any]
+    """Its arguments."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """How an observation becomes an action."""
+
+    widths: list[int]
+    """Of all layers, from all observations' numbers to the action's."""
+    activation: str
+    """Between layers: tanh, relu or elu."""
+    squashing: str
+    """Of the output: "clip" to the bounds, or "tanh" and stretched to the bounds."""
+    low: list[float]
+    """Lower bounds of the action."""
+    high: list[float]
+    """Upper bounds of the action."""
+
+
+@dataclass(frozen=True)
+class Normalization:
+    """How observations are scaled: (x - mean) / √(variance + epsilon), cut to ±clip."""
+
+    keys: list[str]
+    """Observations that are scaled, in the order of their statistics in the file."""
+    epsilon: float
+    """Keeps the root above zero."""
+    clip: float
+    """Largest value after scaling."""
+
+
+@dataclass(frozen=True)
+class Success:
+    """A measurement of the policy."""
+
+    episodes: int
+    """How many were played."""
+    rate: float
+    """Share of them that ended in success."""
+    fidelity: str | None
+    """Preset at which they were played; None for the environment's own."""
+    seed: int
+    """Of the first episode."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a policy file says of itself."""
+
+    algorithm: str
+    """ppo or sac."""
+    environment: Environment
+    """What it was trained on."""
+    observation: dict[str, tuple[int, ...]]
+    """Shape of one world's observation by key, in the order in which the network takes them."""
+    network: Network
+    """How it acts."""
+    normalization: Normalization | None
+    """How observations are scaled before; None if they are not."""
+    success: Success | None
+    """How well it does, if that was measured."""
+    seed: int | None
+    """Seed of training."""
+    steps: int
+    """Environment steps of training, summed over worlds."""
+    commit: str | None
+    """Git commit of the source that trained it, if known."""
+    versions: dict[str, Any]
+    """Python, platform and packages that trained it."""
+
+
+def read_header(text: bytes) -> Header:
+    """Reads and checks a header.
+
+    Args:
+        text: JSON in UTF-8.
+
+    Raises:
+        Misfit: It is no JSON, or a field is missing, unknown, of a wrong type or contradicts
+            another.
+    """
+    try:
+        values = json.loads(text.decode("utf-8"), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise Misfit(f"the header is not JSON: {error}") from None
+    fields = _fields(values, "the header", Header)
+    algorithm = _one_of(fields["algorithm"], "algorithm", tuple(SQUASHING))
+    observation = {
+        key: tuple(_integers(shape, f"observation {key!r}"))
+        for key, shape in _mapping(fields["observation"], "observation").items()
+    }
+    header = Header(
+        algorithm=algorithm,
+        environment=_environment(fields["environment"]),
+        observation=observation,
+        network=_network(fields["network"], algorithm),
+        normalization=_optional(fields["normalization"], _normalization),
+        success=_optional(fields["success"], _success),
+        seed=_optional(fields["seed"], lambda value: _integer(value, "seed")),
+        steps=_integer(fields["steps"], "steps"),
+        commit=_optional(fields["commit"], lambda value: _text(value, "commit")),
+        versions=_mapping(fields["versions"], "versions"),
+    )
+    inputs = sum(math.prod(shape) for shape in observation.values())
+    if header.network.widths[0] != inputs:
+        raise Misfit(f"network.widths begins with {header.network.widths[0]}, should be {inputs}")
+    if header.normalization is not None:
+        for key in header.normalization.keys:
+            _one_of(key, "normalization.keys", tuple(observation))
+    return header
+
+
+def _environment(value: Any) -> Environment:
+    fields = _fields(value, "environment", Environment)
+    found = Environment(
+        _text(fields["id"], "environment.id"),
+        _integer(fields["version"], "environment.version"),
+        _mapping(fields["kwargs"], "environment.kwargs"),
+    )
+    if not found.id.endswith(f"-v{found.version}"):
+        raise Misfit(f"environment.version is {found.version}, but environment.id is {found.id!r}")
+    return found
+
+
+def _network(value: Any, algorithm: str) -> Network:
+    fields = _fields(value, "network", Network)
+    network = Network(
+        _integers(fields["widths"], "network.widths"),
+        _one_of(fields["activation"], "network.activation", ACTIVATION_NAMES),
+        _one_of(fields["squashing"], "network.squashing", (SQUASHING[algorithm],)),
+        [_number(x, "network.low") for x in _list(fields["low"], "network.low")],
+        [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
+    )
+    if len(network.widths) < 2 or min(network.widths) < 1:
+        raise Misfit(f"network.widths is {network.widths}, should be two or more, each at least 1")
+    for name, bounds in (("low", network.low), ("high", network.high)):
+        if len(bounds) != network.widths[-1]:
+            raise Misfit(
+                f"network.{name} has {len(bounds)} entries, should have {network.widths[-1]}"
+            )
+    if any(low > high for low, high in zip(network.low, network.high, strict=True)):
+        raise Misfit(f"network.low is {network.low}, should be at most high, {network.high}")
+    return network
+
+
+def _normalization(value: Any) -> Normalization:
+    fields = _fields(value, "normalization", Normalization)
+    keys = [_text(x, "normalization.keys") for x in _list(fields["keys"], "normalization.keys")]
+    if len(set(keys)) != len(keys):
+        raise Misfit(f"normalization.keys is {keys}, should name each once")
+    epsilon, clip = (_number(fields[x], f"normalization.{x}") for x in ("epsilon", "clip"))
+    if epsilon <= 0 or clip <= 0:
+        raise Misfit(f"normalization has epsilon {epsilon} and clip {clip}, should be above 0")
+    return Normalization(keys, epsilon, clip)
+
+
+def _success(value: Any) -> Success:
+    fields = _fields(value, "success", Success)
+    rate = _number(fields["rate"], "success.rate")
+    if not 0 <= rate <= 1:
+        raise Misfit(f"success.rate is {rate}, should be from 0 to 1")
+    return Success(
+        _integer(fields["episodes"], "success.episodes"),
+        rate,
+        _optional(fields["fidelity"], lambda text: _text(text, "success.fidelity")),
+        _integer(fields["seed"], "success.seed"),
+    )
+
+
+def _fields(value: Any, name: str, kind: Any) -> dict[str, Any]:
+    """A mapping with exactly the fields of a dataclass."""
+    mapping, expected = _mapping(value, name), list(kind.__dataclass_fields__)
+    if set(mapping) != set(expected):
+        odd = ", ".join(sorted(set(mapping) ^ set(expected)))
+        raise Misfit(f"{name} should have the fields {', '.join(expected)}; at odds: {odd}")
+    return mapping
+
+
+def _mapping(value: Any, name: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise Misfit(f"{name} is {value!r:.80}, should be a mapping")
+    return value
+
+
+def _list(value: Any, name: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise Misfit(f"{name} is {value!r:.80}, should be a list")
+    return value
+
+
+def _integers(value: Any, name: str) -> list[int]:
+    return [_integer(number, name) for number in _list(value, name)]
+
+
+def _integer(value: Any, name: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**63:
+        raise Misfit(f"{name} is {value!r:.80}, should be an integer of at least 0")
+    return value
+
+
+def _number(value: Any, name: str) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool) or abs(value) > 1e300:
+        raise Misfit(f"{name} is {value!r:.80}, should be a finite number")
+    return float(value)
+
+
+def _text(value: Any, name: str) -> str:
+    if not isinstance(value, str):
+        raise Misfit(f"{name} is {value!r:.80}, should be text")
+    return value
+
+
+def _one_of(value: Any, name: str, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise Misfit(f"{name} is {value!r:.80}, should be {' or '.join(known)}")
+    return str(value)
+
+
+def _optional(value: Any, read: Callable[[Any], Any]) -> Any:
+    return None if value is None else read(value)
+
+
+def _refuse_constant(name: str) -> None:
+    raise Misfit(f"the header holds {name}, should hold finite numbers")
