@@ -14,7 +14,16 @@ from benchmarks.report import Table, describe, markdown
 
 RESULTS = Path(__file__).parent / "results.json"
 README = Path(__file__).parent.parent / "README.md"
-IN_README = ("speed", "presets", "tower 5", "accuracy", "restitution", "tumbling")
+IN_README = (
+    "speed",
+    "speed_stack",
+    "speed_throw",
+    "presets",
+    "tower 5",
+    "accuracy",
+    "restitution",
+    "tumbling",
+)
 _PLACE = re.compile("(<!-- figures: begin -->\n).*(\n<!-- figures: end -->)", re.DOTALL)
 
 
