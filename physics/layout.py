@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compound import Compound, Group, Part
+from physics.compound import Compound, Group
 from physics.fidelity import Fidelity
 from physics.landing import fastest
+from physics.part import Part
 from physics.scene import Body, Drive, Ground, Material, Scene, Static
 from physics.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
 
