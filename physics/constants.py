@@ -155,6 +155,8 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
 
 def _core_reach(shape: Shape, rounded: bool) -> float:
     """Farthest point in m from a shape's centre that turning moves: roundings turn in place."""
+    if isinstance(shape, Compound) and shape.only is not None:
+        shape = shape.only
     if isinstance(shape, Compound) or not rounded:
         return shape.reach
     return shape.reach - shape.surface(0.0).radius

@@ -49,8 +49,8 @@ SOLID = np.dtype(
 MEETING = np.dtype(
     [
         ("count", "i8", (LANES,)),  # candidates
-        ("travel", "f8", (LANES,)),  # m that the solids may still move before some are missing
-        ("path", "f8", (LANES,)),  # m that they have moved at most in the last drift
+        ("travel", "f8", (LANES,)),  # m that they may still move apart before some are missing
+        ("path", "f8", (LANES,)),  # m that they have done so at most in the last drift
         ("first_touch", "f8", (LANES,)),  # s, NaN before
         ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
         ("bore", "f8", (LANES,)),  # weight that touched in the last step

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compound import Compound, Group, Part
+from physics.compound import Compound, Group
 from physics.fidelity import Fidelity
 from physics.landing import fastest
+from physics.part import Part
 from physics.scene import Body, Drive, Ground, Material, Scene, Static
 from physics.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
 
@@ -114,7 +115,7 @@ def leverage(solid: Solid) -> float:
 
 def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> float:
     """As `leverage`, of a solid with samples: the least of its six sides that can be lain on."""
-    found = []
+    found, least = [], (1e-6 * np.abs(positions).max()) ** 2  # of what is no line but round-off
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
         for height in (positions[:, axis] + radii, -positions[:, axis] + radii):
@@ -122,7 +123,7 @@ def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> floa
             share = weights[lowest] / weights[lowest].sum()
             places = positions[lowest][:, others]
             spread = share @ (places - share @ places) ** 2
-            if np.all(spread > 0.0):
+            if np.all(spread > least):
                 found.append(float(height.max() ** 2 * np.mean(1.0 / spread)))
     return min(found, default=0.0)
 

@@ -30,7 +30,7 @@ MOVING = np.dtype(
 FOUND = np.dtype(
     [
         ("count", "i8"),  # candidates
-        ("travel", "f8"),  # m that both solids may still move before candidates are missing
+        ("travel", "f8"),  # m that they may still move apart before candidates are missing
         ("bore", "f8"),  # weight of the samples that touched in the last step, of springs
     ],
     align=True,

@@ -184,6 +184,7 @@ class World(Variation):
             self._table_valid = self._table_valid or everyone
             self._settled = self._settled or (everyone and substeps > 0)
             return
+        self._table_valid = False
         diverged = np.flatnonzero((state.world["diverged"] != 0) & worlds).tolist()
         if diverged:
             self._raise_diverged(h, diverged)

@@ -269,7 +269,7 @@ class Runner:
             terminated = info["is_success"].copy()
         else:
             terminated = np.zeros(self.count, dtype=bool)
-        truncated = info["out_of_bounds"]
+        truncated = info["out_of_bounds"].copy()
         if self.max_episode_steps is not None:
             truncated = truncated | (self._elapsed >= self.max_episode_steps)
         if begun is not None:

@@ -107,8 +107,9 @@ def _unpickled(
     if algo is None or env_id is None:
         raise UsageError(f"{file} lies in no run folder: say --algo and --env")
 
-    model = _load_model(file, algo, device)
+    # first: should training replace the checkpoint meanwhile, the model is missing, which is told
     normalization = _load_normalization(file.parent / folder.normalization.name)
+    model = _load_model(file, algo, device)
 
     def act(observation: dict[str, np.ndarray]) -> np.ndarray:
         if normalization is not None:

@@ -1,10 +1,12 @@
 """Candidates: the samples of a side that are nearer to its surface than the skin.
 
-A list stays complete while owner and surface together have moved no further than the skin; with an
-empty list, no further than the nearest sample's distance. Each side keeps that allowance in
-`travel`, spends it with every drift, and is searched again when the next step might outrun it. What
-a contact remembers moves along from list to list. Slots behind the end of a list hold zeros, whose
-weight of zero makes them no contact.
+A list stays complete while owner and surface, as seen from each other, have moved no further than
+the skin; with an empty list, no further than the nearest sample's distance. Over a plane only the
+way along its normal counts, and of a turn what it moves of the cores, for roundings turn in place:
+a ball that rolls is listed once. Each side keeps that allowance in `travel`, spends it with every
+drift, and is searched again when the next step might outrun it. What a contact remembers moves
+along from list to list. Slots behind the end of a list hold zeros, whose weight of zero makes them
+no contact.
 """
 
 import math
@@ -257,14 +259,14 @@ def make_side_search(features):
 
 
 @stage
-def sink(shift, swing, path):
+def path_over_plane(shift, swing, path):
     """How far a solid has moved at most along the normal of a plane, which is the world's z."""
     for i in range(LANES):
         path[i] = abs(shift[2, i]) + swing[i]
 
 
 @stage
-def part(shift, other_shift, swing, other_swing, path):
+def path_apart(shift, other_shift, swing, other_swing, path):
     """How far two solids have moved at most, as seen from each other.
 
     The sum of absolute values is never less than the length, and needs no root.
@@ -291,9 +293,9 @@ def make_candidates(features):
             least, skin = 0.5 if opens else 0.0, side.skin
             owner, surface = work.solid[side.owner], work.solid[side.surface]
             if side.kind == PLANE:
-                sink(owner.shift, owner.swing, meeting.path)
+                path_over_plane(owner.shift, owner.swing, meeting.path)
             else:
-                part(owner.shift, surface.shift, owner.swing, surface.swing, meeting.path)
+                path_apart(owner.shift, surface.shift, owner.swing, surface.swing, meeting.path)
             travel, path = meeting.travel, meeting.path
             spent = 0
             for i in range(LANES):

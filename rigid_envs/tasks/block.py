@@ -24,12 +24,14 @@ class Block(NamedTuple):
     Attributes:
         shape: its shape.
         height: m, of its centre over the ground.
+        top: m, of its highest point.
         radius: m, of its farthest point from the upright axis through its centre.
         turns: parts of a turn after each of which it looks the same.
     """
 
     shape: Box | Compound
     height: float
+    top: float
     radius: float
     turns: int
 
@@ -48,7 +50,7 @@ class Block(NamedTuple):
         """
         if isinstance(block, str):
             if choice("block", block, NAMES) == "cube":
-                return cls(Box((HALF,) * 3), HALF, np.sqrt(2.0) * HALF, 4)
+                return cls(Box((HALF,) * 3), HALF, 2.0 * HALF, np.sqrt(2.0) * HALF, 4)
             block = Compound([(Box(BAR), (0, 0, 0)), (Box(STEM), (0, -BAR[1] - STEM[1], 0))])
         if not isinstance(block, Compound):
             instance(f"block, if none of {list(NAMES)},", block, Compound)
@@ -74,7 +76,7 @@ class Block(NamedTuple):
                 f"block must lie flat, its centre of mass at least {WITHIN:g} m within the border "
                 f"of what it lies on, got {within:.3g} m"
             )
-        return cls(block, -bottom, radius, 1)
+        return cls(block, -bottom, height, radius, 1)
 
 
 def _ends(block: Compound) -> tuple[Array, Array]:

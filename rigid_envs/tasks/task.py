@@ -39,7 +39,7 @@ class Task(ABC):
     draws: int
     reward: Reward
     camera: Camera = Camera()
-    sizes: ClassVar[tuple[float, float] | None] = None
+    sizes: tuple[float, float] | None = None
 
     @abstractmethod
     def scene(self) -> Scene:

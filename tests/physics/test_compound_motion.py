@@ -248,6 +248,21 @@ def test_nothing_is_felt_of_a_seam_that_is_slid_over(fidelity, slider):
     assert np.abs(world.orientation[0, 0, :3]).max() < 5e-3
 
 
+@pytest.mark.parametrize("fidelity", LAWS)
+def test_halves_that_are_stacked_seam_on_seam_stand_still(fidelity):
+    """Each sample on a seam is borne once: twice, and springs are so stiff that the stack leans."""
+    slabs = Compound([(Box((0.02, 0.03, 0.015)), (x, 0, 0)) for x in (-0.02, 0.02)])
+    rough = Material(friction=0.5, restitution=0.1)
+    stack = [Body(slabs, mass=MASS, position=(0, 0, 0.015 + 0.03 * k), material=rough)
+             for k in range(3)]  # fmt: skip
+    world = World(Scene(stack, [Ground(rough)]), fidelity)
+    world.advance(1.0)
+    place = world.position.copy()
+    world.advance(3.0)
+    np.testing.assert_allclose(world.position, place, atol=1e-5)
+    assert np.abs(world.orientation[..., :2]).max() < 1e-5
+
+
 # --- worlds -------------------------------------------------------------------------------------
 
 
