@@ -67,16 +67,14 @@ class Push(Task):
     draws = 3 + 2 * TRIES
     camera = Camera(target=(-0.03, -0.04, 0.15), distance=1.28)
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
+    # a larger cube would reach up to the finger at home, and leave no place clear of all posts
+    sizes = (0.0, 2.5)
 
     def __init__(
         self, target_yaw: bool = False, obstacles: int = 0, block: str | Compound = "cube"
     ) -> None:
         """Adds what the options ask for to the goal and to the draws of a start."""
         self.block = Block.of(block)
-        # as large as a cube of 2.5 times: it would reach up to the finger at home, or leave no
-        # place that is clear of all posts
-        room = min(2.0 * HALF / self.block.top, np.sqrt(2.0) * HALF / self.block.radius)
-        self.sizes = (0.0, 2.5 * float(room))
         self.target_yaw = bool(instance("target_yaw", target_yaw, bool))
         self.obstacles = integer("obstacles", obstacles, low=0)
         if self.obstacles > len(POSTS):
@@ -86,6 +84,8 @@ class Push(Task):
                 raise ValueError(
                     f"target_yaw=True asks for the yaw of a cube: leave it out with block={block!r}"
                 )
+            room = min(2.0 * HALF / self.block.top, np.sqrt(2.0) * HALF / self.block.radius)
+            self.sizes = (0.0, Push.sizes[1] * float(room))  # no larger than the largest cube
             self.bounds = _of_block(Push.bounds)
             self.goal_bounds = _of_block(Push.goal_bounds)
         if self.target_yaw:

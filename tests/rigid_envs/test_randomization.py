@@ -361,14 +361,16 @@ def test_a_task_laid_out_for_one_size_takes_no_other():
     ("task", "size", "wanted"),
     [
         ("push", (1.0, 3.0), "at most 2.5 in this task, got (1.0, 3.0)"),
+        (("push", {"block": "t", "obstacles": 4}), (1.0, 1.6), "at most 1.58"),
         ("stack", (0.4, 1.0), "within 0.5 and 1.5 in this task, got (0.4, 1.0)"),
         ("stack", 1.6, "within 0.5 and 1.5 in this task, got (1.6, 1.6)"),
         ("throw", (1.0, 2.0), "within 0.5 and 1.75 in this task, got (1.0, 2.0)"),
     ],
 )
 def test_sizes_that_a_task_has_no_room_for_are_refused(task, size, wanted):
+    name, options = task if isinstance(task, tuple) else (task, {})
     with pytest.raises(ValueError, match=re.escape(f"randomize['size'] must be {wanted}")):
-        Runner(task, 1, randomize={"size": size})
+        Runner(name, 1, randomize={"size": size}, **options)
 
 
 def test_observed_parameters_need_ranges_and_options_stay_within_them():
