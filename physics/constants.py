@@ -145,12 +145,42 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "pair_mass": pair_mass,
         "owner_inverse_mass": inverse[:, a],
         "surface_inverse_mass": inverse[:, b],
+        "surface_centre": _surface_centres(layout, size[:, b]),
+        "yielding": _yielding(layout, p),
         "shear_stiffness": shear_stiffness,
         "shear_damping": shear_damping,
         "friction": friction,
         "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
         "twist_damping": np.where(turns, twist_damping, 0.0),
     }
+
+
+def _surface_centres(layout: Layout, size: Array) -> Array:
+    """[n, sides, 3] m: a part's frame lies apart from the centre of its compound."""
+    centres = np.zeros((*size.shape, 3))
+    for k, side in enumerate(layout.sides):
+        if side.part >= 0:
+            part = layout.parts[side.part][1]
+            centres[:, k] = -size[:, k, None] * (part.rotation.T @ np.array(part.position))
+    return centres
+
+
+def _yielding(layout: Layout, p: Parameters) -> Array:
+    """[n, sides, 3] 1/(kg m^2): inverse moments of the surface's body, in the surface's frame.
+
+    Only a sphere meets a body with all of the pair's damping at one point, however far from the
+    body's centre: it must know how easily the body turns there. Of others each of many samples has
+    a small share. Where a part lies askew in its compound, the tensor A there isn't diagonal: for
+    m . A m stands the bound sum_i m_i^2 sum_j |A_ij|, which never damps too much.
+    """
+    inverse = 1.0 / _inertia(layout, p)
+    yielding = np.zeros((len(inverse), len(layout.sides), 3))
+    for k, side in enumerate(layout.sides):
+        if side.other < layout.bodies and len(side.samples.weights) == 1:
+            turn = np.eye(3) if side.part < 0 else layout.parts[side.part][1].rotation
+            tensor = np.einsum("ki,nk,kj->nij", turn, inverse[:, side.other], turn)
+            yielding[:, k] = np.abs(tensor).sum(axis=-1)
+    return yielding
 
 
 def _core_reach(shape: Shape, rounded: bool) -> float:

@@ -73,6 +73,8 @@ SIDE = np.dtype(
         ("pair_mass", "f8"),  # kg, reduced mass
         ("owner_inverse_mass", "f8"),  # 1/kg
         ("surface_inverse_mass", "f8"),  # 1/kg; 0 for statics
+        ("surface_centre", "f8", (3,)),  # m, centre of mass of the surface's solid, in its frame
+        ("yielding", "f8", (3,)),  # 1/(kg m^2), how easily that solid turns, where it counts
         ("shear_stiffness", "f8"),  # N/m
         ("shear_damping", "f8"),  # N s/m
         ("friction", "f8"),
@@ -127,6 +129,8 @@ SIDE_VARIES = (
     "pair_mass",
     "owner_inverse_mass",
     "surface_inverse_mass",
+    "surface_centre",
+    "yielding",
     "shear_stiffness",
     "shear_damping",
     "friction",

@@ -54,7 +54,8 @@ def make_loop(features, kind, report):
         stiffness, damping, floors = constants.stiffness, constants.damping, constants.rest_speed
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, mass_rates, bearing = constants.friction, seen.mass_rate, seen.bearing
-        pair_mass = constants.pair_mass
+        pair_mass, yielding = constants.pair_mass, constants.yielding
+        centre = constants.surface_centre
         sharp = constants.sharp != 0
         rolling, spinning = constants.rolling, constants.spinning
         twist_stiffness, twist_damping = constants.twist_stiffness, constants.twist_damping
@@ -74,6 +75,18 @@ def make_loop(features, kind, report):
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
+                if not plane:
+                    inverse_mass += turned_by(
+                        at(yielding[0], i),
+                        at(yielding[1], i),
+                        at(yielding[2], i),
+                        rx + c[0, i] - at(centre[0], i),
+                        ry + c[1, i] - at(centre[1], i),
+                        rz + c[2, i] - at(centre[2], i),
+                        nx,
+                        ny,
+                        nz,
+                    )
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -201,6 +214,13 @@ def make_loop(features, kind, report):
                     out.weight[i] = weight
 
     return loop
+
+
+@stage
+def turned_by(jx, jy, jz, x, y, z, nx, ny, nz):
+    """1/kg that turning adds to a body's inverse mass at p from its centre: (p x n)^2 / J."""
+    mx, my, mz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+    return jx * mx * mx + jy * my * my + jz * mz * mz
 
 
 @cache

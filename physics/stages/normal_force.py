@@ -121,7 +121,7 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
         k: N/m.
         a: damping coefficient.
         floor: m/s.
-        inverse_mass: 1/kg of the pair.
+        inverse_mass: 1/kg of the pair, at this point if it is its only sample.
         h: s.
         mass_rate: kg/s, m / (W h).
         memory: m/s, impact speed, negative while separating, 0 while apart.
