@@ -56,11 +56,12 @@ def make_substep(features: Features):
         kinematics(model, work)
         parts(model, work)
         candidates(model, state, work, g, opens)
+        # named once: LLVM would have all of it twice
+        span, drifted = (glance * h, 0.0) if look else (h, h)
+        forces(model, state, work, g, span, drifted, elapsed)
         if look:
-            forces(model, state, work, g, glance * h, 0.0, elapsed)
             end_look(model, state, work, g)
         else:
-            forces(model, state, work, g, h, h, elapsed)
             kick(model, work, 0.5 * h)
 
     return substep
