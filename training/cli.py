@@ -39,6 +39,7 @@ TRAIN_EXTRA = (
     "matplotlib",
     "imageio",
     "imageio_ffmpeg",
+    "PIL",
 )
 RENDER_EXTRA = ("pygame",)
 # what commands tell an environment, or a function beside its arguments, themselves
@@ -54,6 +55,7 @@ OWN = {
     "policy": "it is the first word",
     "video": "give --output",
     "quiet": "there is no such choice",
+    "gif_width": "there is no such choice",
 }
 INTERRUPTED = 130
 """Exit status of a command ended by Ctrl-C, as shells have it."""
@@ -315,11 +317,14 @@ def _parser() -> argparse.ArgumentParser:
     add_policy(evaluation)
     add_episodes(evaluation, 1000)
 
-    recording = command("record", _record, "Film a policy: an mp4 and a still.")
+    recording = command("record", _record, "Film a policy: an mp4 or a GIF, and a still.")
     add_policy(recording)
     add_episodes(recording, 8)
     recording.add_argument(
-        "-o", "--output", type=Path, help="mp4 to write (default: video.mp4 in the run folder)"
+        "-o",
+        "--output",
+        type=Path,
+        help="mp4 or GIF to write, the latter small (default: video.mp4 in the run folder)",
     )
 
     exporting = command("export", _export, "Copy the policy of a run into one small file.")
