@@ -183,9 +183,11 @@ def _play(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from training.plot import plot_learning_curve
+    from training.plot import plot_learning_curves
+    from training.run_folder import RunFolder
 
-    print(plot_learning_curve(_run_folder(options), options.output))
+    folders = [RunFolder(path) for path in options.runs] or [_run_folder(options)]
+    print(plot_learning_curves(folders, options.output))
     return 0
 
 
@@ -359,11 +361,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_environment(playing)
 
-    plotting = command("plot", _plot, "Draw the learning curve of a run.")
-    plotting.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")
+    plotting = command("plot", _plot, "Draw the learning curve of a run, or of several seeds.")
+    plotting.add_argument(
+        "runs",
+        nargs="*",
+        type=Path,
+        metavar="RUN",
+        help="run folder (default: latest); several are drawn with their mean and spread",
+    )
+    plotting.set_defaults(policy=None)
     add_latest(plotting)
     plotting.add_argument(
-        "-o", "--output", type=Path, help="PNG (default: learning_curve.png in the run folder)"
+        "-o",
+        "--output",
+        type=Path,
+        help="PNG (default: learning_curve.png in the run folder; of several, beside them)",
     )
 
     demonstration = command("demo", _demo, "Train, evaluate, film and plot, in one go.")
