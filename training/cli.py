@@ -1,4 +1,4 @@
-"""The command line: `rigid-envs COMMAND`, as train, evaluate, record, export, play.
+"""The command line: `rigid-envs COMMAND`, as train, evaluate, record, results, play.
 
 Starts without Stable-Baselines3 or torch: each command imports what it needs, and says which extra
 installs what is missing. Flags follow rl-baselines3-zoo where it has a counterpart.
@@ -20,6 +20,7 @@ from training.flags import (
     add_episodes,
     add_latest,
     add_policy,
+    add_results,
     add_training,
     count,
     whole,
@@ -188,6 +189,28 @@ def _plot(options: argparse.Namespace) -> int:
 
     folders = [RunFolder(path) for path in options.runs] or [_run_folder(options)]
     print(plot_learning_curves(folders, options.output))
+    return 0
+
+
+def _results(options: argparse.Namespace) -> int:
+    from training.results import SOURCE, check_repository, update_results
+    from training.results_page import check_pages
+
+    repository = options.repository or SOURCE
+    if not options.check:
+        update_results(
+            options.runs,
+            options.log_folder,
+            repository,
+            episodes=options.n_episodes,
+            replace=options.replace,
+        )
+        return 0
+    if options.runs or options.replace:
+        raise UsageError("--check records nothing: leave the run folders and --replace away")
+    check_repository(repository)
+    check_pages(repository)
+    print("docs/results.md and README.md are what results/ says")
     return 0
 
 
@@ -377,6 +400,8 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         help="PNG (default: learning_curve.png in the run folder; of several, beside them)",
     )
+
+    add_results(command("results", _results, "Record finished runs and write docs/results.md."))
 
     demonstration = command("demo", _demo, "Train, evaluate, film and plot, in one go.")
     add_training(demonstration)

@@ -72,6 +72,30 @@ def add_latest(parser: argparse.ArgumentParser) -> None:
     add_folder(parser)
 
 
+def add_results(parser: argparse.ArgumentParser) -> None:
+    """What is recorded, and where."""
+    parser.add_argument(
+        "runs",
+        nargs="*",
+        type=Path,
+        metavar="RUN",
+        help="run folder (default: all that are finished and not recorded yet)",
+    )
+    add_folder(parser)
+    parser.add_argument(
+        "-n", "--n-episodes", type=count, default=1000, help="(default: %(default)s)"
+    )
+    parser.add_argument(
+        "--replace", action="store_true", help="put these runs in the place of others of their seed"
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="only say whether the texts are what results/ says"
+    )
+    parser.add_argument(
+        "--repository", type=Path, help="clone that keeps results (default: this one)"
+    )
+
+
 def add_folder(parser: argparse.ArgumentParser) -> None:
     """Where runs are kept."""
     parser.add_argument(
