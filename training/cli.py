@@ -22,6 +22,7 @@ from training.flags import (
     add_policy,
     add_results,
     add_training,
+    add_tuning,
     count,
     whole,
 )
@@ -43,6 +44,7 @@ TRAIN_EXTRA = (
     "PIL",
 )
 RENDER_EXTRA = ("pygame",)
+TUNE_EXTRA = (*TRAIN_EXTRA, "optuna")
 # what commands tell an environment, or a function beside its arguments, themselves
 OWN = {
     "seed": "give --seed",
@@ -214,6 +216,34 @@ def _results(options: argparse.Namespace) -> int:
     return 0
 
 
+def _tune(options: argparse.Namespace) -> int:
+    config = _config(options)
+
+    from training.tuning import PART, tune
+
+    # as many steps as were asked for, or a part of those that the settings have
+    short = (
+        config
+        if options.n_timesteps
+        else config.replace(n_timesteps=max(1, config.n_timesteps // PART))
+    )
+    best = tune(
+        short,
+        options.log_folder,
+        trials=options.n_trials,
+        episodes=options.n_episodes,
+        storage=options.storage,
+        study_name=options.study_name,
+        device=options.device,
+        num_threads=options.num_threads,
+    )
+    if best.settings is not None:
+        print(f"# {best.summary}")
+        full = _configured(options).n_timesteps
+        print(best.settings.replace(n_timesteps=full).as_yaml(), end="")
+    return INTERRUPTED if best.interrupted else 0
+
+
 def _demo(options: argparse.Namespace) -> int:
     config = _config(options)
 
@@ -230,10 +260,14 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> "TrainConfig":
+    return _changed(_configured(options), options)
+
+
+def _configured(options: argparse.Namespace) -> "TrainConfig":
+    """The settings of the file."""
     from training.config import load_config
 
-    config = load_config(options.algo or DEMO_ALGO, options.env or DEMO_ENV, options.config)
-    return _changed(config, options)
+    return load_config(options.algo or DEMO_ALGO, options.env or DEMO_ENV, options.config)
 
 
 def _changed(config: "TrainConfig", options: argparse.Namespace) -> "TrainConfig":
@@ -402,6 +436,12 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     add_results(command("results", _results, "Record finished runs and write docs/results.md."))
+
+    tuning = command(
+        "tune", _tune, "Search settings by many short trainings.", ("tune", TUNE_EXTRA)
+    )
+    add_training(tuning)
+    add_tuning(tuning)
 
     demonstration = command("demo", _demo, "Train, evaluate, film and plot, in one go.")
     add_training(demonstration)

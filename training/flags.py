@@ -96,6 +96,27 @@ def add_results(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tuning(parser: argparse.ArgumentParser) -> None:
+    """How much is tried, and where it is kept."""
+    parser.add_argument(
+        "--n-trials",
+        type=count,
+        default=50,
+        help="trainings in all, of former commands too (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--n-episodes",
+        type=count,
+        default=1000,
+        help="to measure each policy on (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--storage",
+        help="SQLite file or URL of a database (default: <environment>_tuning.db among the runs)",
+    )
+    parser.add_argument("--study-name", help="of the study in it (default: <algo>-<environment>)")
+
+
 def add_folder(parser: argparse.ArgumentParser) -> None:
     """Where runs are kept."""
     parser.add_argument(

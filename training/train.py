@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,6 +94,7 @@ def train(
     num_threads: int | None = None,
     save_every: int | None = None,
     quiet: bool = False,
+    callbacks: Sequence[BaseCallback] = (),
 ) -> TrainResult:
     """Trains as configured; Ctrl-C ends it early and keeps what was learned.
 
@@ -104,6 +105,7 @@ def train(
         num_threads: Threads of torch; by default two, beyond which small networks gain nothing.
         save_every: Steps between checkpoints; a tenth of the run by default.
         quiet: Show no progress.
+        callbacks: More to call at every step, after ours.
 
     Raises:
         UsageError: The environment refuses its arguments, the device does not exist, or the disk is
@@ -117,7 +119,7 @@ def train(
         with folder.claimed():
             with _naming_full_disks(folder):
                 model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
-            return _learn(model, worlds, folder, config, save_every, quiet)
+            return _learn(model, worlds, folder, config, save_every, quiet, more=callbacks)
 
 
 def resume(
@@ -179,6 +181,7 @@ def _learn(
     save_every: int | None,
     quiet: bool,
     before: _Seconds = NO_SECONDS,
+    more: Sequence[BaseCallback] = (),
 ) -> TrainResult:
     """Takes the steps that are left, with checkpoints on the way and at the end."""
     steps_before, start = model.num_timesteps, time.perf_counter()
@@ -201,6 +204,7 @@ def _learn(
         callbacks.append(BatchedTimeoutBootstrap())
     if config.target_success_rate is not None:
         callbacks.append(StopAtSuccess(config.target_success_rate))
+    callbacks += more
     interrupted = False
     try:
         left = config.n_timesteps - steps_before
