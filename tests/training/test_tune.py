@@ -1,6 +1,7 @@
 """The search for settings: small, on the test double."""
 
 import sqlite3
+from functools import partial
 
 import optuna
 import pytest
@@ -10,12 +11,35 @@ from optuna.trial import TrialState
 from training import cli, tuning
 from training.config import TrainConfig, load_config
 from training.errors import UsageError
-from training.search_space import SPACES, draw, with_drawn
+from training.search_space import SPACES, OneOf, draw, with_drawn
 from training.tuning import tune
 
 
 def study_of(path) -> optuna.Study:
     return optuna.load_study(study_name=None, storage=f"sqlite:///{path}")
+
+
+@pytest.fixture(autouse=True)
+def small_space(monkeypatch, request):
+    """Trials that take a moment, and one thread, which neither waits nor makes others wait."""
+    if "whole_space" in request.fixturenames:
+        return
+    ppo = {"n_steps": (5, 10), "minibatches": (1, 2), "n_epochs": (1, 2), "net_arch": ("8", "8 8")}
+    for name, values in ppo.items():
+        monkeypatch.setitem(SPACES["ppo"], name, OneOf(values))
+    sac = {"batch_size": (16, 32), "gradient_steps": (1,), "net_arch": ("8", "8 8")}
+    for name, values in sac.items():
+        monkeypatch.setitem(SPACES["sac"], name, OneOf(values))
+    monkeypatch.setattr(tuning, "train", partial(one_thread, tuning.train))
+
+
+def one_thread(train, *arguments, **options):
+    return train(*arguments, **{**options, "num_threads": 1})
+
+
+@pytest.fixture
+def whole_space():
+    """Keeps the table as it is."""
 
 
 @pytest.fixture
@@ -146,7 +170,9 @@ def test_hindsight_is_searched_too(quick_sac, tmp_path):
 
 
 @pytest.mark.parametrize("algo", SPACES)
-def test_every_row_of_the_table_gives_settings_that_are_taken(algo, quick_ppo, quick_sac):
+def test_every_row_of_the_table_gives_settings_that_are_taken(
+    algo, quick_ppo, quick_sac, whole_space
+):
     config: TrainConfig = {"ppo": quick_ppo, "sac": quick_sac}[algo]
     config = config.replace(n_envs=64)
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
