@@ -160,6 +160,8 @@ def _command(config: TrainConfig) -> str:
         packaged = load_config(config.algo, config.env_id, PACKAGED / f"{config.algo}.yaml")
         if packaged.replace(seed=config.seed) == config:
             return f"{words} --seed {config.seed}"
+        if packaged.replace(seed=config.seed, n_timesteps=config.n_timesteps) == config:
+            return f"{words} --seed {config.seed} -n {config.n_timesteps}"
     except UsageError:  # no settings come with us for it
         pass
     task = task_name(config.env_id, config.env_kwargs)

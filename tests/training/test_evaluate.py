@@ -182,6 +182,22 @@ def test_a_gif_shrinks_and_keeps_what_moves(tmp_path):
     np.testing.assert_allclose(last[25, 20], 255, atol=3)
 
 
+def test_a_gif_keeps_the_colour_of_what_is_small(tmp_path):
+    path = tmp_path / "ball.gif"
+    shades = np.linspace(180, 255, 200).astype(np.uint8)
+    with GifWriter(path, fps=25) as writer:
+        for step in range(11):
+            frame = np.empty((200, 200, 3), np.uint8)
+            frame[:] = shades[:, None]
+            frame[100:106, 10 * step : 10 * step + 6] = (230, 120, 40)
+            writer.append_data(frame)
+    with Image.open(path) as film:
+        film.seek(5)
+        np.testing.assert_allclose(
+            np.asarray(film.convert("RGB"))[103, 103], (230, 120, 40), atol=10
+        )
+
+
 def test_three_episodes_of_push_make_a_small_gif(tmp_path):
     video, _ = record(
         scripted_policy("RigidEnvs/Push-v0"), tmp_path / "push.gif", episodes=3, quiet=True

@@ -14,7 +14,7 @@ from training.errors import UsageError
 from training.evaluate import FIRST_SEED, evaluate
 from training.model_state import read_state
 from training.policy_file import load_policy_file, read_policy
-from training.recording import ROWS
+from training.recording import ROWS, _command
 from training.result import read_result, read_results, task_name
 from training.results import SOURCE, update_results
 from training.results_page import README, check_pages
@@ -239,6 +239,16 @@ def test_names_of_tasks_are_names_of_folders():
     arguments = {"randomize": {"size": [0.8, 1.2]}, "fidelity": "fast", "block": "T"}
     name = task_name("RigidEnvs/Push-v0", arguments)
     assert name == "RigidEnvs-Push-v0-block-T-randomize-size-0.8-1.2"
+
+
+def test_the_command_is_the_shortest_that_trains_the_same():
+    config = load_config("ppo", "RigidEnvs/Push-v0")
+    words = "rigid-envs train --algo ppo --env RigidEnvs/Push-v0"
+    assert _command(config.replace(seed=7)) == f"{words} --seed 7"
+    assert _command(config.replace(seed=7, n_timesteps=1000)) == f"{words} --seed 7 -n 1000"
+    assert _command(config.replace(seed=7, gamma=0.9)) == (
+        f"{words} --config results/ppo/RigidEnvs-Push-v0_seed7/config.yaml"
+    )
 
 
 def test_a_long_learning_curve_is_thinned_to_its_ends(repository, runs):
