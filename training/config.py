@@ -241,6 +241,12 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     return ALGORITHMS[algo].from_mapping(env_id, values, source)
 
 
+def packaged_environments(algo: str) -> list[str]:
+    """Ids of the environments that an algorithm's packaged file has settings for."""
+    source = f"configs/{algo}.yaml"
+    return [name for name in _read_yaml(PACKAGED / f"{algo}.yaml", source) if name != TARGET]
+
+
 def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:
     """Reads settings given as KEY:VALUE, each value as YAML has it.
 

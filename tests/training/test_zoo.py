@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from training.config import ALGORITHMS, PACKAGED, TARGET, load_config
+from training.config import ALGORITHMS, PACKAGED, load_config, packaged_environments
 
 ROOT = Path(__file__).parents[2]
 ZOO = """
@@ -47,16 +47,11 @@ print(json.dumps(found))
 needs_zoo = pytest.mark.skipif(find_spec("rl_zoo3") is None, reason="rl_zoo3 is not installed")
 
 
-def environments(algo: str) -> list[str]:
-    entries = yaml.safe_load((PACKAGED / f"{algo}.yaml").read_text())
-    return [env_id for env_id in entries if env_id != TARGET]
-
-
 def read_by_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
     """By environment: settings as the zoo understands them, and what became of them."""
     file = PACKAGED / f"{algo}.yaml"
     result = subprocess.run(
-        [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *environments(algo)],
+        [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *packaged_environments(algo)],
         cwd=ROOT,
         capture_output=True,
         text=True,
