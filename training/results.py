@@ -53,7 +53,6 @@ def update_results(
         if not (path / "run.json").exists():
             raise UsageError(f"{path} is no run folder: run.json is missing")
     read_results(repository)  # what is damaged should show before anything is evaluated
-    changed = set()
     for path in runs or _runs(log_folder):
         try:
             result = record_run(RunFolder(path), repository, episodes, replace=replace, quiet=quiet)
@@ -62,9 +61,9 @@ def update_results(
         else:
             place = result.folder(repository).relative_to(repository)
             say(f"recorded {path}: {place}")
-            changed.add(result.kind)
+            _remove_outdated(result, repository)
     for group in by_kind(read_results(repository)):
-        _draw(group, repository, group[0].kind in changed, quiet, say)
+        _draw(group, repository, quiet, say)
     for path in write_pages(repository):
         say(f"written  {path}")
 
@@ -96,17 +95,22 @@ def _number(path: Path) -> int:
     return int(path.name.rpartition("_")[2])
 
 
+def _remove_outdated(result: Result, repository: Path) -> None:
+    """Removes pictures that a new result is missing from, at once: the command may yet be ended."""
+    curve, film = pictures(result.kind)
+    (repository / curve).unlink(missing_ok=True)
+    seeds = [other.seed for other in read_results(repository) if other.kind == result.kind]
+    if result.seed == min(seeds):
+        (repository / film).unlink(missing_ok=True)
+
+
 def _draw(
-    group: Sequence[Result],
-    repository: Path,
-    anew: bool,
-    quiet: bool,
-    say: Callable[[str], object],
+    group: Sequence[Result], repository: Path, quiet: bool, say: Callable[[str], object]
 ) -> None:
-    """Draws the learning curves and films the first seed, where that is missing or out of date."""
+    """Draws the learning curves and films the first seed, where that is missing."""
     curve, film = pictures(group[0].kind)
     (repository / curve).parent.mkdir(parents=True, exist_ok=True)
-    if anew or not (repository / curve).exists():
+    if not (repository / curve).exists():
         folders = [result.folder(repository) for result in group]
         draw_learning_curves(
             [read_curve(folder / "progress.csv") for folder in folders],
@@ -115,7 +119,7 @@ def _draw(
             labels=[f"seed {result.seed}" for result in group],
         )
         say(f"drawn    {curve}")
-    if anew or not (repository / film).exists():
+    if not (repository / film).exists():
         _film(group[0].folder(repository) / "policy.policy", repository / film, quiet)
         say(f"filmed   {film}")
 

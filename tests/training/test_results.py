@@ -159,6 +159,22 @@ def test_another_run_of_a_seed_replaces_only_when_told(repository, runs):
         update(repository, log_folder=runs, replace=True)
 
 
+def test_pictures_follow_even_if_ctrl_c_came_before_them(repository, runs, monkeypatch):
+    first, second = sorted((runs / "ppo").iterdir())
+    update(repository, first)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("training.results._draw", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            update(repository, second)
+    said = update(repository, log_folder=runs / "nothing")
+    # the film is of the lowest seed, which is as before
+    assert [line.split()[0] for line in said] == ["drawn", "written", "written"]
+
+
 def unfinished(run: RunFolder) -> None:
     change(run.checkpoint / "state.json", finished=False)
 
