@@ -7,7 +7,7 @@ import pytest
 
 from training import cli
 
-COMMANDS = ("train", "evaluate", "record", "scripted", "plot", "demo")
+COMMANDS = ("train", "evaluate", "record", "scripted", "plot", "tune", "demo")
 
 
 def test_starts_without_stable_baselines3_and_torch():
@@ -55,6 +55,10 @@ def test_every_command_has_help(command, capsys):
         (["evaluate", "-f", "nowhere"], "no run of ppo on RigidEnvs/Push-v0 under nowhere"),
         (["record", "-f", "nowhere", "--algo", "sac"], "no run of sac"),
         (["plot", "nowhere"], "progress.csv is missing"),
+        (["tune", "--algo", "pp0"], "did you mean 'ppo'?"),
+        (["tune", "--n-trials", "0"], "should be an integer of at least 1"),
+        (["tune", "--env-kwargs", "reward_type:denze"], "RigidEnvs/Push-v0 refuses"),
+        (["tune", "--storage", "nosuch://place"], "storage nosuch://place cannot be used"),
         (["scripted", "--env", "Nothing-v0"], "no scripted controller"),
         (["scripted", "--env-kwargs", "target_jaw:true"], "did you mean 'target_yaw'?"),
         (["scripted", "--env-kwargs", "blocks:3"], "unknown argument 'blocks'"),

@@ -43,6 +43,7 @@ def save_checkpoint(
     config: TrainConfig,
     *,
     seconds: float = 0.0,
+    seconds_in_envs: float | None = 0.0,
     finished: bool = False,
 ) -> None:
     """Replaces the folder's checkpoint; if that fails, the one before stays.
@@ -52,13 +53,15 @@ def save_checkpoint(
         folder: The run.
         config: Its settings.
         seconds: Wall time of training so far, in seconds.
+        seconds_in_envs: How much of it was spent in the environments; None if that is not known.
         finished: Whether training is over, so that it can't be resumed.
 
     Raises:
         UsageError: It cannot be written, as on a full disk, or the model has diverged.
     """
     files = {folder.policy.name: policy_file_of(model, config).to_bytes()}
-    files |= state_files(model, {"seconds": seconds, "finished": finished})
+    notes = {"seconds": seconds, "seconds_in_envs": seconds_in_envs, "finished": finished}
+    files |= state_files(model, notes)
     model_file = io.BytesIO()
     model.save(model_file, exclude=TRANSIENT)
     files[folder.model.name] = model_file.getvalue()

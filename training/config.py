@@ -1,7 +1,9 @@
 """Training settings: typed, read from YAML keyed by environment id, and checked before use.
 
 The schema is rl-baselines3-zoo's, except that network settings are given as a mapping and never
-evaluated as code.
+evaluated as code. What the zoo hands on to Stable-Baselines3, which would refuse it, may stand
+beside the environments instead of among their settings: `target_success_rate`, keyed by
+environment id too.
 """
 
 import dataclasses
@@ -33,6 +35,7 @@ PACKAGED = Path(__file__).resolve().parents[1] / "configs"
 Not by importlib.resources: where the project is installed for editing it cannot read a folder
 without code, and a `configs` folder of the user's own would come first.
 """
+TARGET = "target_success_rate"
 NETWORK = {
     "net_arch": widths,
     "activation": choice("tanh", "relu", "elu"),
@@ -63,12 +66,13 @@ class TrainConfig:
     """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
     """Stop early when this share of the last 1,000 (or n_envs, if more) episodes succeed."""
-    seed: int | None = setting(optional(integer(0)), None)
+    seed: int | None = setting(optional(integer(0)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy", "MlpPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3; goal environments need MultiInputPolicy."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK), {})
-    """Network: net_arch (hidden layer widths), activation, log_std_init."""
+    """Network: net_arch (hidden layer widths), log_std_init, activation, which is by default
+    Stable-Baselines3's: tanh for PPO, relu for SAC."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -210,8 +214,19 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
         )
     source = str(path) if path is not None else f"configs/{algo}.yaml"
     entries = _read_yaml(path if path is not None else PACKAGED / f"{algo}.yaml", source)
+    targets = entries.pop(TARGET, {})
+    names = [str(key) for key in entries]
+    if not names:
+        raise UsageError(f"{source}: should be a mapping from environment ids to settings")
+    if not isinstance(targets, dict):
+        raise UsageError(f"{source}: {TARGET} is {targets!r}, should be keyed by environment id")
+    for other in targets:
+        if other not in entries:
+            raise UsageError(
+                f"{source}: {TARGET}: no settings for environment {other!r}; "
+                f"did you mean {nearest(str(other), names)!r}?"
+            )
     if env_id not in entries:
-        names = [str(key) for key in entries]
         raise UsageError(
             f"{source}: no settings for environment {env_id!r}; "
             f"did you mean {nearest(env_id, names)!r}?"
@@ -219,7 +234,17 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     values = entries[env_id]
     if not isinstance(values, dict):
         raise UsageError(f"{source}: {env_id} is {values!r}, should be a mapping of settings")
+    if env_id in targets:
+        if TARGET in values:
+            raise UsageError(f"{source}: {env_id}: {TARGET} is given twice, should be given once")
+        values = {**values, TARGET: targets[env_id]}
     return ALGORITHMS[algo].from_mapping(env_id, values, source)
+
+
+def packaged_environments(algo: str) -> list[str]:
+    """Ids of the environments that an algorithm's packaged file has settings for."""
+    source = f"configs/{algo}.yaml"
+    return [name for name in _read_yaml(PACKAGED / f"{algo}.yaml", source) if name != TARGET]
 
 
 def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:

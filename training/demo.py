@@ -5,7 +5,7 @@ from pathlib import Path
 
 from training.config import TrainConfig
 from training.evaluate import Evaluation, evaluate, print_evaluation
-from training.plot import plot_learning_curve
+from training.plot import plot_learning_curves
 from training.record import record
 from training.run_folder import RunFolder
 from training.train import TrainResult, train
@@ -35,7 +35,7 @@ def demo(
     policy = trained_policy(trained.folder.path)
     result = evaluate(policy, episodes)
     video, still = record(policy, trained.folder.path / "video.mp4")
-    curve = plot_learning_curve(trained.folder)
+    curve = plot_learning_curves([trained.folder])
     print_evaluation(policy, result)
     print(f"success rate    {result.success_at_end.mean():.1%} of {episodes:,} episodes")
     print(f"wall time       {time.perf_counter() - start:.0f} s, training {trained.seconds:.0f} s")

@@ -72,6 +72,100 @@ def add_latest(parser: argparse.ArgumentParser) -> None:
     add_folder(parser)
 
 
+def add_export(parser: argparse.ArgumentParser) -> None:
+    """What is copied, and where to."""
+    parser.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")
+    add_latest(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, help="file to write (default: <run>.policy, in this folder)"
+    )
+    parser.add_argument(
+        "-n", "--n-episodes", type=count, help="measure success on as many, and say so in the file"
+    )
+    parser.add_argument(
+        "--sb3", action="store_true", help="copy Stable-Baselines3's model and statistics too"
+    )
+
+
+def add_plot(parser: argparse.ArgumentParser) -> None:
+    """Which runs are drawn, and where to."""
+    parser.add_argument(
+        "runs",
+        nargs="*",
+        type=Path,
+        metavar="RUN",
+        help="run folder (default: latest); several are drawn with their mean and spread",
+    )
+    parser.set_defaults(policy=None)
+    add_latest(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        help="PNG (default: learning_curve.png in the run folder; of several, beside them)",
+    )
+
+
+def add_play(parser: argparse.ArgumentParser) -> None:
+    """What is played, and what of it is shown."""
+    parser.add_argument(
+        "env", nargs="?", default=DEMO_ENV, help="environment id (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=whole, help="of the first episode (default: any)")
+    parser.add_argument("--reward", choices=("sparse", "dense"), help="reward to show")
+    parser.add_argument("--blocks", type=count, help="cubes to stack")
+    parser.add_argument("--show-forces", action="store_true", help="draw contact forces")
+    parser.add_argument(
+        "--show-particles", action="store_true", help="draw what touches, not exact shapes"
+    )
+    add_environment(parser)
+
+
+def add_results(parser: argparse.ArgumentParser) -> None:
+    """What is recorded, and where."""
+    parser.add_argument(
+        "runs",
+        nargs="*",
+        type=Path,
+        metavar="RUN",
+        help="run folder (default: all that are finished and not recorded yet)",
+    )
+    add_folder(parser)
+    parser.add_argument(
+        "-n", "--n-episodes", type=count, default=1000, help="(default: %(default)s)"
+    )
+    parser.add_argument(
+        "--replace", action="store_true", help="put these runs in the place of others of their seed"
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="only say whether the texts are what results/ says"
+    )
+    parser.add_argument(
+        "--repository", type=Path, help="clone that keeps results (default: this one)"
+    )
+
+
+def add_tuning(parser: argparse.ArgumentParser) -> None:
+    """How much is tried, and where it is kept."""
+    parser.add_argument(
+        "--n-trials",
+        type=count,
+        default=50,
+        help="trainings in all, of former commands too (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--n-episodes",
+        type=count,
+        default=1000,
+        help="to measure each policy on (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--storage",
+        help="SQLite file or URL of a database (default: <environment>_tuning.db among the runs)",
+    )
+    parser.add_argument("--study-name", help="of the study in it (default: <algo>-<environment>)")
+
+
 def add_folder(parser: argparse.ArgumentParser) -> None:
     """Where runs are kept."""
     parser.add_argument(

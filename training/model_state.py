@@ -1,6 +1,7 @@
 """All that a model has learned and drawn, as files that are read without unpickling.
 
-    state.json    steps, updates, episodes, seconds, the last episodes' outcomes; random numbers
+    state.json    steps, updates, episodes, seconds, also in the environments; the last episodes'
+                  outcomes; random numbers
     tensors.pt    networks, optimisers, statistics of VecNormalize, torch's random numbers; read
                   with `weights_only`, which makes nothing but tensors and their containers
     replay.npz    what SAC has in its replay buffer

@@ -1,4 +1,4 @@
-"""Films a policy: an mp4 and a still, with no display."""
+"""Films a policy: an mp4 or a GIF and a still, with no display."""
 
 import os
 import sys
@@ -14,9 +14,11 @@ from rich.progress import track
 from training.environments import make_single_env
 from training.errors import UsageError
 from training.evaluate import FIRST_SEED
+from training.gif import WIDTH, GifWriter
 from training.policy import Policy
 
 DEFAULT_FPS = 25
+SUFFIXES = (".mp4", ".gif")
 
 
 def record(
@@ -26,16 +28,18 @@ def record(
     episodes: int = 8,
     seed: int = FIRST_SEED,
     quiet: bool = False,
+    gif_width: int = WIDTH,
     **env_kwargs: Any,
 ) -> tuple[Path, Path]:
     """Plays the episodes with seeds seed, seed + 1, ... on the single environment and films them.
 
     Args:
         policy: What acts.
-        video: The mp4 to write; the still takes the same name with .png.
+        video: The mp4 or GIF to write; the still takes the same name with .png.
         episodes: How many.
         seed: Seed of the first.
         quiet: Show no progress.
+        gif_width: Of a GIF, in pixels; an mp4 has the size of the pictures.
         env_kwargs: Arguments of the environment, over those that the policy was trained with.
 
     Returns:
@@ -46,18 +50,16 @@ def record(
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
-    if video.suffix != ".mp4":
-        raise UsageError(f"video is {str(video)!r}, should end in .mp4")
+    if video.suffix not in SUFFIXES:
+        raise UsageError(f"video is {str(video)!r}, should end in {' or '.join(SUFFIXES)}")
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     arguments = {**policy.env_kwargs, **env_kwargs, "render_mode": "rgb_array"}
     env = make_single_env(policy.env_id, **arguments)
     video.parent.mkdir(parents=True, exist_ok=True)
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
-    # The codec wants even sides: blocks of 2 keep the picture's size, blocks of 16 stretch it.
     console = Console(quiet=quiet or not sys.stdout.isatty())
-    writer: Any = imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
-    with writer, closing(env):
+    with _writer(video, fps, gif_width) as writer, closing(env):
         for episode in track(range(episodes), "filming", transient=True, console=console):
             frames = _film_episode(env, policy, seed + episode)
             if episode == 0:
@@ -65,6 +67,13 @@ def record(
             for frame in frames:
                 writer.append_data(frame)
     return video, still
+
+
+def _writer(video: Path, fps: float, gif_width: int) -> Any:
+    if video.suffix == ".gif":
+        return GifWriter(video, fps, gif_width)
+    # The codec wants even sides: blocks of 2 keep the picture's size, blocks of 16 stretch it.
+    return imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
 
 
 def _film_episode(env: Any, policy: Policy, seed: int) -> list[np.ndarray]:

@@ -130,7 +130,7 @@ def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
     parent = _parent(log_folder, config.algo)
     try:
         parent.mkdir(parents=True, exist_ok=True)
-        path = _make_next(parent / _folder_name(config.env_id), number)
+        path = _make_next(parent / folder_name(config.env_id), number)
     except OSError as error:
         raise UsageError(f"cannot make a folder in {parent}: {error.strerror}") from None
     run = {
@@ -208,13 +208,14 @@ def _parent(log_folder: Path, algo: str) -> Path:
     return log_folder / algo
 
 
-def _folder_name(env_id: str) -> str:
+def folder_name(env_id: str) -> str:
+    """An environment id as part of the name of a folder, as in RigidEnvs-Push-v0."""
     return env_id.replace("/", "-").replace(":", "-")
 
 
 def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
     """Number and path of each run of the algorithm on the environment."""
-    prefix = _folder_name(env_id) + "_"
+    prefix = folder_name(env_id) + "_"
     return [
         (int(path.name.removeprefix(prefix)), path)
         for path in _parent(log_folder, algo).glob(f"{prefix}*")

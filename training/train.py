@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,6 +56,25 @@ class TrainResult:
     """Whether Ctrl-C ended it."""
 
 
+@dataclass(frozen=True)
+class _Seconds:
+    """Wall time of a run before it was resumed."""
+
+    total: float
+    """In seconds."""
+    in_envs: float | None
+    """How much of it in the environments; None for runs that did not keep it."""
+
+    @classmethod
+    def of(cls, state: dict[str, Any]) -> "_Seconds":
+        """As a checkpoint has it."""
+        in_envs = state.get("seconds_in_envs")
+        return cls(float(state["seconds"]), None if in_envs is None else float(in_envs))
+
+
+NO_SECONDS = _Seconds(0.0, 0.0)
+
+
 class LinearSchedule:
     """A value that falls linearly to zero over the run."""
 
@@ -75,6 +94,7 @@ def train(
     num_threads: int | None = None,
     save_every: int | None = None,
     quiet: bool = False,
+    callbacks: Sequence[BaseCallback] = (),
 ) -> TrainResult:
     """Trains as configured; Ctrl-C ends it early and keeps what was learned.
 
@@ -85,6 +105,7 @@ def train(
         num_threads: Threads of torch; by default two, beyond which small networks gain nothing.
         save_every: Steps between checkpoints; a tenth of the run by default.
         quiet: Show no progress.
+        callbacks: More to call at every step, after ours.
 
     Raises:
         UsageError: The environment refuses its arguments, the device does not exist, or the disk is
@@ -98,7 +119,7 @@ def train(
         with folder.claimed():
             with _naming_full_disks(folder):
                 model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
-            return _learn(model, worlds, folder, config, save_every, quiet)
+            return _learn(model, worlds, folder, config, save_every, quiet, more=callbacks)
 
 
 def resume(
@@ -138,7 +159,7 @@ def resume(
             try:
                 state = read_state(checkpoint)
                 restore(model, checkpoint)
-                seconds, finished = float(state["seconds"]), bool(state["finished"])
+                before, finished = _Seconds.of(state), bool(state["finished"])
             except Exception as error:  # whatever a damaged file makes its reader raise
                 raise UsageError(f"{checkpoint} is damaged: {error}") from error
             if finished or model.num_timesteps >= config.n_timesteps:
@@ -149,7 +170,7 @@ def resume(
             folder.note_resumption(model.num_timesteps)
             with _naming_full_disks(folder):
                 model.set_logger(continued_logger(folder, checkpoint, state))
-            return _learn(model, worlds, folder, config, save_every, quiet, seconds)
+            return _learn(model, worlds, folder, config, save_every, quiet, before)
 
 
 def _learn(
@@ -159,22 +180,31 @@ def _learn(
     config: TrainConfig,
     save_every: int | None,
     quiet: bool,
-    seconds_before: float = 0.0,
+    before: _Seconds = NO_SECONDS,
+    more: Sequence[BaseCallback] = (),
 ) -> TrainResult:
     """Takes the steps that are left, with checkpoints on the way and at the end."""
     steps_before, start = model.num_timesteps, time.perf_counter()
 
     def save(finished: bool = False) -> None:
-        seconds = seconds_before + time.perf_counter() - start
-        save_checkpoint(model, folder, config, seconds=seconds, finished=finished)
+        in_envs = before.in_envs
+        save_checkpoint(
+            model,
+            folder,
+            config,
+            seconds=before.total + time.perf_counter() - start,
+            seconds_in_envs=None if in_envs is None else in_envs + worlds.seconds_in_envs,
+            finished=finished,
+        )
 
     checkpoints = PeriodicCheckpoint(save_every or max(config.n_timesteps // 10, 1), save)
-    progress = TrainingProgress(config.n_timesteps, quiet, seconds_before)
+    progress = TrainingProgress(config.n_timesteps, quiet, before.total)
     callbacks: list[BaseCallback] = [checkpoints, progress]
     if isinstance(config, PPOConfig):
         callbacks.append(BatchedTimeoutBootstrap())
     if config.target_success_rate is not None:
         callbacks.append(StopAtSuccess(config.target_success_rate))
+    callbacks += more
     interrupted = False
     try:
         left = config.n_timesteps - steps_before

@@ -41,6 +41,43 @@ def test_every_field_has_a_docstring(kind):
         assert declaration.lstrip().startswith('"""'), field.name
 
 
+def test_a_target_stands_among_the_settings_or_beside_them(write_yaml):
+    among = f"{ENV}: {{n_timesteps: 10, target_success_rate: 0.9}}"
+    beside = f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: {{{ENV}: 0.9}}"
+    assert load_config("ppo", ENV, write_yaml(among)) == load_config("ppo", ENV, write_yaml(beside))
+    assert load_config("ppo", ENV, write_yaml(among)).target_success_rate == 0.9
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: 0.9", "is 0.9, should be keyed by"),
+        (
+            f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: {{RigidEnvs/Posh-v0: 0.9}}",
+            f"no settings for environment 'RigidEnvs/Posh-v0'; did you mean '{ENV}'",
+        ),
+        (
+            f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: {{{ENV}: 9}}",
+            "target_success_rate is 9, should be a number above 0 and at most 1",
+        ),
+        (
+            f"{ENV}: {{n_timesteps: 10, target_success_rate: 1}}\n"
+            f"target_success_rate: {{{ENV}: 1}}",
+            "target_success_rate is given twice",
+        ),
+        (f"target_success_rate: {{{ENV}: 1}}", "should be a mapping from environment ids"),
+    ],
+)
+def test_wrong_targets_are_named(write_yaml, text, complaint):
+    with pytest.raises(UsageError, match=complaint):
+        load_config("ppo", ENV, write_yaml(text))
+
+
+def test_training_is_seeded_unless_a_file_says_otherwise(write_yaml):
+    assert load(write_yaml, "{n_timesteps: 10}").seed == 0
+    assert load(write_yaml, "{n_timesteps: 10, seed: null}").seed is None
+
+
 def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
     with pytest.raises(UsageError) as caught:
         load(write_yaml, "{n_timesteps: 100, learning_rat: 0.1}")

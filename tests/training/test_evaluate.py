@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.stats import binomtest
 
 from tests.training.reach import ReachEnv, straight_to_the_goal
@@ -7,6 +8,7 @@ from training import evaluate as evaluate_module
 from training import policy as policy_module
 from training.errors import UsageError
 from training.evaluate import evaluate, print_evaluation, wilson_interval
+from training.gif import GifWriter
 from training.policy import Policy, scripted_policy
 from training.record import record
 from training.train import train
@@ -89,7 +91,7 @@ def test_numbers_out_of_range_are_named(solver, tmp_path):
         evaluate(solver, 1, seed=-1)
     with pytest.raises(UsageError, match="number of episodes is 0"):
         record(solver, tmp_path / "video.mp4", episodes=0)
-    with pytest.raises(UsageError, match=r"should end in \.mp4"):
+    with pytest.raises(UsageError, match=r"should end in \.mp4 or \.gif"):
         record(solver, tmp_path / "video.avi")
 
 
@@ -152,3 +154,63 @@ def test_film_and_still_are_written(solver, tmp_path):
     video, still = record(solver, tmp_path / "films" / "reach.mp4", episodes=2, quiet=True)
     assert video.read_bytes()[4:8] == b"ftyp"
     assert still.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_gif_has_every_second_picture_for_twice_as_long(solver, tmp_path):
+    video, still = record(solver, tmp_path / "reach.gif", episodes=2, quiet=True)
+    assert still.read_bytes().startswith(b"\x89PNG")
+    with Image.open(video) as film:
+        assert film.format == "GIF"
+        assert film.info["loop"] == 0
+        assert film.size == (64, 48)  # what is small is not enlarged
+
+
+def test_a_gif_shrinks_and_keeps_what_moves(tmp_path):
+    path = tmp_path / "moving.gif"
+    with GifWriter(path, fps=25, width=100) as writer:
+        for step in range(11):
+            frame = np.full((100, 200, 3), 255, np.uint8)
+            frame[:, 10 * step : 10 * step + 40] = (200, 30, 30)
+            writer.append_data(frame)
+    with Image.open(path) as film:
+        assert film.size == (100, 50)
+        assert film.n_frames == 6
+        assert film.info["duration"] == 80  # ms
+        film.seek(5)
+        last = np.asarray(film.convert("RGB"))
+    np.testing.assert_allclose(last[25, 60], (200, 30, 30), atol=3)
+    np.testing.assert_allclose(last[25, 20], 255, atol=3)
+
+
+def test_a_gif_keeps_the_colour_of_what_is_small(tmp_path):
+    path = tmp_path / "ball.gif"
+    shades = np.linspace(180, 255, 200).astype(np.uint8)
+    with GifWriter(path, fps=25) as writer:
+        for step in range(11):
+            frame = np.empty((200, 200, 3), np.uint8)
+            frame[:] = shades[:, None]
+            frame[100:106, 10 * step : 10 * step + 6] = (230, 120, 40)
+            writer.append_data(frame)
+    with Image.open(path) as film:
+        film.seek(5)
+        np.testing.assert_allclose(
+            np.asarray(film.convert("RGB"))[103, 103], (230, 120, 40), atol=10
+        )
+
+
+def test_three_episodes_of_push_make_a_small_gif(tmp_path):
+    video, _ = record(
+        scripted_policy("RigidEnvs/Push-v0"), tmp_path / "push.gif", episodes=3, quiet=True
+    )
+    assert video.stat().st_size <= 300_000
+    with Image.open(video) as film:
+        assert film.size == (320, 320)
+
+
+def test_a_film_that_fails_leaves_no_gif(tmp_path, reach):
+    def fails(observation):
+        raise RuntimeError("ours")
+
+    with pytest.raises(RuntimeError, match="ours"):
+        record(Policy(fails, reach, "fails"), tmp_path / "film.gif", episodes=1, quiet=True)
+    assert not list(tmp_path.iterdir())

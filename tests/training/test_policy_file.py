@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.training.reach import ReachVectorEnv
 from training import cli
-from training.config import ALGORITHMS, PACKAGED, _read_yaml, load_config
+from training.config import ALGORITHMS, load_config, packaged_environments
 from training.errors import UsageError
 from training.evaluate import evaluate
 from training.policy_file import load_policy_file, read_policy
@@ -131,7 +131,7 @@ def test_the_header_says_what_was_trained(kept):
 
 def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
     for algo, kind in ALGORITHMS.items():
-        for env_id in _read_yaml(PACKAGED / f"{algo}.yaml", algo):
+        for env_id in packaged_environments(algo):
             network = load_config(algo, env_id).policy_kwargs
             short = {"n_timesteps": 16, "policy_kwargs": network, "normalize": True}
             if algo == "ppo":

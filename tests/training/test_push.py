@@ -9,7 +9,7 @@ from stable_baselines3.her import HerReplayBuffer
 from training.config import load_config
 from training.environments import make_vector_env
 from training.evaluate import evaluate
-from training.plot import plot_learning_curve
+from training.plot import plot_learning_curves
 from training.policy import scripted_policy
 from training.record import record
 from training.train import train
@@ -114,7 +114,7 @@ def test_a_short_run_trains_evaluates_films_and_draws(tmp_path):
     video, still = record(policy, folder.path / "video.mp4", episodes=1, quiet=True)
     assert video.stat().st_size > 0
     assert still.stat().st_size > 0
-    assert plot_learning_curve(folder).stat().st_size < 300_000
+    assert plot_learning_curves([folder]).stat().st_size < 300_000
 
 
 def test_the_packaged_settings_build_on_the_environment(tmp_path):

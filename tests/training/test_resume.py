@@ -91,8 +91,14 @@ def test_ppo_goes_on_to_the_steps_it_was_made_for(
 ):
     config = quick_ppo.replace(n_timesteps=400, normalize=normalize, learning_rate="lin_1e-3")
     folder = interrupted(config, tmp_path, monkeypatch, 200, error)
-    before = read_learning_curve(folder)
+    before, state = read_learning_curve(folder), read_state(folder.checkpoint)
+    assert 0 < state["seconds_in_envs"] < state["seconds"]
     result = resume(folder, quiet=True)
+    at_end = read_state(folder.checkpoint)
+    in_envs = result.environment_share * result.seconds
+    assert at_end["seconds_in_envs"] == pytest.approx(state["seconds_in_envs"] + in_envs)
+    assert at_end["seconds_in_envs"] < at_end["seconds"]
+    assert at_end["seconds"] >= state["seconds"] + result.seconds
     assert (result.steps, result.steps_before) == (400, 160)
     assert steps_of(folder) == [80, 160, 240, 320, 400]
     assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
@@ -258,6 +264,17 @@ def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path
     assert resume(folder, quiet=True).steps == 400
     assert steps_of(folder) == [80, 160, 240, 320, 400]
     assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
+
+
+def test_a_checkpoint_that_did_not_keep_the_environments_time_goes_on(
+    quick_ppo, tmp_path, monkeypatch
+):
+    folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
+    state = read_state(folder.checkpoint)
+    del state["seconds_in_envs"]
+    (folder.checkpoint / "state.json").write_text(json.dumps(state))
+    resume(folder, quiet=True)
+    assert read_state(folder.checkpoint)["seconds_in_envs"] is None
 
 
 def test_what_cannot_be_resumed_is_named(quick_ppo, tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from training import train as train_module
 from training.errors import UsageError
-from training.plot import plot_learning_curve, read_learning_curve
+from training.plot import plot_learning_curves, read_learning_curve
 from training.progress import StopAtSuccess
 from training.train import LinearSchedule, train
 from training.trained_policy import trained_policy
@@ -144,7 +144,7 @@ def test_learning_curve_is_a_small_picture(quick_ppo, tmp_path):
     rows = read_learning_curve(result.folder)
     assert rows[-1]["time/total_timesteps"] == 160
     assert rows[-1]["time/wall_time"] > 0
-    picture = plot_learning_curve(result.folder)
+    picture = plot_learning_curves([result.folder])
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert picture.stat().st_size < 300_000
 
@@ -153,7 +153,7 @@ def test_learning_curve_of_nothing_is_refused(quick_ppo, tmp_path):
     result = train(quick_ppo, tmp_path, quiet=True)
     result.folder.progress.write_text("time/total_timesteps,time/wall_time\n80,1.0\n")
     with pytest.raises(UsageError, match="no row with a success rate"):
-        plot_learning_curve(result.folder)
+        plot_learning_curves([result.folder])
     result.folder.progress.unlink()
     with pytest.raises(UsageError, match=r"progress\.csv is missing"):
-        plot_learning_curve(result.folder)
+        plot_learning_curves([result.folder])

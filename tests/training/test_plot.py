@@ -1,0 +1,93 @@
+"""Learning curves of several seeds in one picture."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from training import cli
+from training.config import TrainConfig
+from training.errors import UsageError
+from training.plot import mean_and_spread, plot_learning_curves
+from training.run_folder import RunFolder, create_run_folder
+
+HEADER = "time/total_timesteps,time/wall_time,rollout/success_rate\n"
+
+
+def learned(tmp_path: Path, config: TrainConfig, rows: str) -> RunFolder:
+    """A run with that learning curve."""
+    folder = create_run_folder(tmp_path, config)
+    folder.progress.write_text(HEADER + rows)
+    return folder
+
+
+@pytest.fixture
+def seeds(tmp_path, quick_ppo) -> list[RunFolder]:
+    """Three runs, of which the last one ends early."""
+    curves = ("80,1,0.1\n160,2,0.5\n", "80,1.5,0.3\n160,3,0.9\n", "80,1.2,1.0\n")
+    return [
+        learned(tmp_path, quick_ppo.replace(seed=seed), rows) for seed, rows in enumerate(curves)
+    ]
+
+
+def test_mean_and_band_reach_as_far_as_all_lines_do():
+    lines = [([0.0, 2.0], [0.0, 20.0]), ([1.0, 3.0], [30.0, 50.0])]
+    places, mean, lowest, highest = mean_and_spread(lines)
+    assert (places[0], places[-1]) == (1.0, 2.0)
+    np.testing.assert_allclose(lowest, 10 * places)
+    np.testing.assert_allclose(highest, 20 + 10 * places)
+    np.testing.assert_allclose(mean, 10 + 10 * places)
+
+
+def test_lines_that_share_no_stretch_have_no_mean():
+    assert mean_and_spread([([0.0, 1.0], [0, 1]), ([1.0, 2.0], [0, 1])]) is None
+
+
+def test_several_seeds_make_a_picture_beside_their_folders(seeds, tmp_path):
+    for folders in (seeds, seeds[:2]):
+        picture = plot_learning_curves(folders)
+        assert picture == tmp_path / "ppo" / "Test-Reach-v0_learning_curves.png"
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert picture.stat().st_size < 300_000
+
+
+def test_the_command_takes_one_run_or_several(seeds, tmp_path, capsys):
+    words = ["plot", *(str(folder.path) for folder in seeds)]
+    out = tmp_path / "curves" / "all.png"
+    assert cli.main([*words, "-o", str(out)]) == 0
+    assert capsys.readouterr().out == f"{out}\n"
+    assert cli.main(words[:2]) == 0
+    assert capsys.readouterr().out == f"{seeds[0].path / 'learning_curve.png'}\n"
+
+
+def test_runs_of_different_kinds_are_refused_by_name(seeds, tmp_path, quick_ppo, quick_sac):
+    rows = "80,1,0.1\n160,2,0.5\n"
+    other = quick_ppo.replace(env_kwargs={"reward_type": "sparse"})
+    sac = learned(tmp_path, quick_sac, rows)
+    elsewhere = type(quick_ppo).from_mapping("RigidEnvs/Push-v0", quick_ppo.as_mapping(), "")
+    for folder, complaint in (
+        (sac, r"algorithm of .*sac.Test-Reach-v0_1 is 'sac', but .*ppo.Test-Reach-v0_1 has 'ppo'"),
+        (learned(tmp_path, elsewhere, rows), "environment of .* is 'RigidEnvs/Push-v0', but"),
+        (learned(tmp_path, other, rows), "env_kwargs of .*'sparse'.* differ by their seed only"),
+        (seeds[0], "is given twice"),
+    ):
+        with pytest.raises(UsageError, match=complaint):
+            plot_learning_curves([*seeds, folder])
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (None, "progress.csv is missing"),
+        (HEADER, "no row with a success rate"),
+        (HEADER + "80,one,0.5\n", r"progress\.csv is damaged"),
+        ("\0\xff", r"progress\.csv"),
+    ],
+)
+def test_a_run_without_a_curve_is_named(seeds, content, complaint):
+    last = seeds[-1]
+    last.progress.unlink()
+    if content is not None:
+        last.progress.write_text(content, encoding="latin-1")
+    with pytest.raises(UsageError, match=rf"Test-Reach-v0_3.*{complaint}"):
+        plot_learning_curves(seeds)

@@ -1,0 +1,75 @@
+"""rl-baselines3-zoo takes our settings as they are: by its own reader, down to the model.
+
+In a process of its own, for importing the zoo changes Gymnasium's TimeLimit for all who share it.
+"""
+
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from training.config import ALGORITHMS, PACKAGED, load_config, packaged_environments
+
+ROOT = Path(__file__).parents[2]
+ZOO = """
+import json, sys
+from argparse import Namespace
+from copy import deepcopy
+import rigid_envs
+from rl_zoo3 import ALGOS
+from rl_zoo3.exp_manager import ExperimentManager
+
+algo, config, log_folder, *env_ids = sys.argv[1:]
+found = {}
+for env_id in env_ids:
+    manager = ExperimentManager(Namespace(), algo, env_id, log_folder, config=config, verbose=0)
+    settings = manager._preprocess_hyperparams(manager.read_hyperparameters()[0])[0]
+    envs = manager.create_envs(1, no_log=True)
+    model = ALGOS[algo](env=envs, seed=0, device="cpu", **deepcopy(settings))
+    settings = {
+        name: value(1.0) if name in ("learning_rate", "clip_range") else value
+        for name, value in settings.items()
+    }
+    if "replay_buffer_class" in settings:
+        settings["replay_buffer_class"] = settings["replay_buffer_class"].__name__
+    settings |= {"n_envs": manager.n_envs, "n_timesteps": manager.n_timesteps}
+    settings |= {"env_kwargs": manager.env_kwargs, "normalize": bool(manager.normalize)}
+    found[env_id] = {"settings": settings, "gamma": model.gamma, "net_arch": model.policy.net_arch}
+print()
+print(json.dumps(found))
+"""
+
+needs_zoo = pytest.mark.skipif(find_spec("rl_zoo3") is None, reason="rl_zoo3 is not installed")
+
+
+def read_by_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
+    """By environment: settings as the zoo understands them, and what became of them."""
+    file = PACKAGED / f"{algo}.yaml"
+    result = subprocess.run(
+        [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *packaged_environments(algo)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result.stderr
+    found: dict[str, Any] = json.loads(result.stdout.splitlines()[-1])
+    return found
+
+
+@needs_zoo
+@pytest.mark.parametrize("algo", ALGORITHMS)
+def test_the_zoo_reads_what_we_read_and_makes_a_model_of_it(algo, tmp_path):
+    for env_id, found in read_by_the_zoo(algo, tmp_path).items():
+        ours = load_config(algo, env_id).as_mapping()
+        theirs = found["settings"]
+        assert theirs == {name: ours[name] for name in theirs}
+        # all that decides a run: what is left out is what is by default
+        written = yaml.safe_load((PACKAGED / f"{algo}.yaml").read_text())[env_id]
+        assert set(theirs) == set(written) | {"normalize"}
+        assert found["gamma"] == ours["gamma"]
+        assert found["net_arch"] is not None
