@@ -28,6 +28,7 @@ from training.export import policy_file_of
 from training.learning_curve import continued_logger
 from training.model_state import read_state, restore
 from training.progress import StopAtSuccess, TrainingProgress, success_rate
+from training.rollout_threads import OneThreadRollouts
 from training.run_folder import RunFolder, create_run_folder
 from training.vec_env import RigidVecEnv
 
@@ -201,7 +202,7 @@ def _learn(
     progress = TrainingProgress(config.n_timesteps, quiet, before.total)
     callbacks: list[BaseCallback] = [checkpoints, progress]
     if isinstance(config, PPOConfig):
-        callbacks.append(BatchedTimeoutBootstrap())
+        callbacks += [BatchedTimeoutBootstrap(), OneThreadRollouts()]
     if config.target_success_rate is not None:
         callbacks.append(StopAtSuccess(config.target_success_rate))
     callbacks += more

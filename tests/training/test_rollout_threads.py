@@ -1,0 +1,28 @@
+"""Torch leaves its second core to the worlds while they are stepped, and has it back after."""
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.policies import MultiInputActorCriticPolicy as Policy
+
+from training.config import load_config
+from training.train import train
+
+
+def test_rollouts_take_one_thread_and_updates_their_own(tmp_path, monkeypatch):
+    seen = {"rollout": set(), "update": set()}
+
+    def noting(name, function):
+        def call(self, *arguments, **named):
+            seen[name].add(torch.get_num_threads())
+            return function(self, *arguments, **named)
+
+        return call
+
+    monkeypatch.setattr(PPO, "train", noting("update", PPO.train))
+    monkeypatch.setattr(Policy, "forward", noting("rollout", Policy.forward))
+    config = load_config("ppo", "RigidEnvs/Push-v0").replace(
+        n_envs=8, n_timesteps=800, n_steps=50, batch_size=100
+    )
+    train(config, tmp_path, num_threads=2, quiet=True)
+    assert seen == {"rollout": {1}, "update": {2}}
+    assert torch.get_num_threads() == 2
