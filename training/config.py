@@ -62,10 +62,15 @@ class TrainConfig:
     """Environment steps to train for, summed over worlds."""
     env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments of the environment: reward_type, fidelity, ..."""
+    finish_timesteps: int = setting(integer(0), 0)
+    """Of these steps so many, the last, are trained with `finish_env_kwargs` too."""
+    finish_env_kwargs: dict[str, Any] = setting(mapping(), {})
+    """Arguments over `env_kwargs` to finish with, as a finer fidelity; they are the policy's."""
     normalize: bool = setting(flag, False)
     """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
-    """Stop early when this share of the last 1,000 (or n_envs, if more) episodes succeed."""
+    """Stop early when this share of the last 1,000 (or n_envs, if more) episodes succeed; where the
+    run finishes on other arguments, of those episodes."""
     seed: int | None = setting(optional(integer(0)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy", "MlpPolicy"), "MultiInputPolicy")
@@ -116,6 +121,11 @@ class TrainConfig:
         """The same settings but for `values`, checked like those of a file."""
         return self.from_mapping(self.env_id, {**self.as_mapping(), **values}, source)
 
+    @property
+    def last_env_kwargs(self) -> dict[str, Any]:
+        """Arguments of the environment that the run finishes on."""
+        return {**self.env_kwargs, **self.finish_env_kwargs}
+
     def as_mapping(self) -> dict[str, Any]:
         """The settings by name, as they would stand in a file."""
         values = dataclasses.asdict(self)
@@ -128,6 +138,16 @@ class TrainConfig:
 
     def _check_together(self, source: str) -> None:
         """Raises UsageError where settings that are right alone contradict each other."""
+        if bool(self.finish_timesteps) != bool(self.finish_env_kwargs):
+            raise UsageError(
+                f"{source}: {self.env_id}: finish_timesteps is {self.finish_timesteps} and "
+                f"finish_env_kwargs is {self.finish_env_kwargs}, should be given both or neither"
+            )
+        if self.finish_timesteps >= self.n_timesteps:
+            raise UsageError(
+                f"{source}: {self.env_id}: finish_timesteps is {self.finish_timesteps}, should be "
+                f"below n_timesteps = {self.n_timesteps}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +174,7 @@ class PPOConfig(TrainConfig):
     """End an update when the policy has moved this far; null for no limit."""
 
     def _check_together(self, source: str) -> None:
+        super()._check_together(source)
         rollout = self.n_envs * self.n_steps
         if self.batch_size > rollout:
             raise UsageError(
@@ -186,6 +207,7 @@ class SACConfig(TrainConfig):
     """Of HerReplayBuffer: n_sampled_goal, goal_selection_strategy."""
 
     def _check_together(self, source: str) -> None:
+        super()._check_together(source)
         if self.replay_buffer_kwargs and self.replay_buffer_class is None:
             raise UsageError(
                 f"{source}: {self.env_id}: replay_buffer_kwargs is {self.replay_buffer_kwargs}, "

@@ -99,7 +99,7 @@ def policy_file_of(
     scaling, mean, variance = _statistics(normalization)
     header = Header(
         algorithm=config.algo,
-        environment=Environment(env_id, int(version[1]), config.env_kwargs),
+        environment=Environment(env_id, int(version[1]), config.last_env_kwargs),
         observation={key: tuple(one.shape or ()) for key, one in space.spaces.items()},
         network=Network(
             widths=[layers[0][0].shape[1], *(len(biases) for _, biases in layers)],

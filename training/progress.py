@@ -8,6 +8,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
+from training.finish import FinishElsewhere
+
 SECONDS_BETWEEN_UPDATES = 0.5
 SECONDS_BETWEEN_LINES = 15.0
 
@@ -80,16 +82,23 @@ class TrainingProgress(BaseCallback):
 
 
 class StopAtSuccess(BaseCallback):
-    """Ends training when the success rate over a full window of episodes reaches the target."""
+    """Ends training when the success rate over a full window of episodes reaches the target.
 
-    def __init__(self, target: float):
+    Args:
+        target: Share of episodes.
+        finish: Where the run is to finish on other worlds, which of them counts.
+    """
+
+    def __init__(self, target: float, finish: FinishElsewhere | None = None):
         super().__init__()
         self.target = target
+        self.finish = finish
         self.reached = False
 
     def _on_rollout_end(self) -> None:
         episodes = self.model.ep_success_buffer
-        if episodes is not None and len(episodes) == episodes.maxlen:
+        counts = self.finish is None or self.finish.finishing
+        if counts and episodes is not None and len(episodes) == episodes.maxlen:
             self.reached = bool(np.mean(episodes) >= self.target)
 
     def _on_step(self) -> bool:

@@ -65,14 +65,14 @@ def record_run(
     values = {
         "algorithm": config.algo,
         "env_id": config.env_id,
-        "arguments": config.env_kwargs,
+        "arguments": config.last_env_kwargs,
         "seed": config.seed,
         "steps": state.get("steps"),
         "seconds": round(seconds, 3),
         "environment_share": round(float(state["seconds_in_envs"]) / seconds, 4),
         "episodes": episodes,
         "first_seed": FIRST_SEED,
-        "fidelity": config.env_kwargs.get("fidelity"),
+        "fidelity": config.last_env_kwargs.get("fidelity"),
         "success_at_end": _share(outcome.success_at_end),
         "success_at_any_time": _share(outcome.success_at_any_time),
         "command": _command(config),
@@ -124,7 +124,7 @@ def _check_place(
     folder: RunFolder, config: TrainConfig, run: dict[str, Any], repository: Path, replace: bool
 ) -> None:
     """Raises UsageError where a result would take another's place or stand in the wrong table."""
-    task = task_name(config.env_id, config.env_kwargs)
+    task = task_name(config.env_id, config.last_env_kwargs)
     for other in read_results(repository):
         if (other.algorithm, other.task) != (config.algo, task):
             continue
@@ -132,16 +132,16 @@ def _check_place(
         if other.seed == config.seed:
             if replace:
                 continue
-            same = other.started == run.get("started") and other.arguments == config.env_kwargs
+            same = other.started == run.get("started") and other.arguments == config.last_env_kwargs
             raise UsageError(
                 f"it is recorded already, in {place}"
                 if same
                 else f"{place} holds another run of its seed; to put this in its place: "
                 f"rigid-envs results --replace {folder.path}"
             )
-        if other.arguments != config.env_kwargs:
+        if other.arguments != config.last_env_kwargs:
             raise UsageError(
-                f"its arguments are {config.env_kwargs}, but {place}, of the same table, "
+                f"its arguments are {config.last_env_kwargs}, but {place}, of the same table, "
                 f"has {other.arguments}"
             )
 
@@ -164,7 +164,7 @@ def _command(config: TrainConfig) -> str:
             return f"{words} --seed {config.seed} -n {config.n_timesteps}"
     except UsageError:  # no settings come with us for it
         pass
-    task = task_name(config.env_id, config.env_kwargs)
+    task = task_name(config.env_id, config.last_env_kwargs)
     return f"{words} --config results/{config.algo}/{task}_seed{config.seed}/config.yaml"
 
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from training.config import PPOConfig, SACConfig, TrainConfig
 from training.environments import make_vector_env
 from training.errors import UsageError
 from training.export import policy_file_of
+from training.finish import FinishElsewhere
 from training.learning_curve import continued_logger
 from training.model_state import read_state, restore
 from training.progress import StopAtSuccess, TrainingProgress, success_rate
@@ -116,6 +118,7 @@ def train(
     config = dataclasses.replace(config, seed=seed)
     with _worlds_and_model(config, device, num_threads) as (worlds, model):
         policy_file_of(model, config).to_bytes()  # what can't be kept is not worth training
+        _check_finish(config, worlds)
         folder = create_run_folder(log_folder, config)
         with folder.claimed():
             with _naming_full_disks(folder):
@@ -203,8 +206,18 @@ def _learn(
     callbacks: list[BaseCallback] = [checkpoints, progress]
     if isinstance(config, PPOConfig):
         callbacks += [BatchedTimeoutBootstrap(), OneThreadRollouts()]
+    finish = None
+    if config.finish_timesteps:
+        assert config.seed is not None
+        finish = FinishElsewhere(
+            worlds,
+            partial(make_vector_env, config.env_id, config.n_envs, **config.last_env_kwargs),
+            config.n_timesteps - config.finish_timesteps,
+            config.seed + config.n_envs,
+        )
+        callbacks.append(finish)
     if config.target_success_rate is not None:
-        callbacks.append(StopAtSuccess(config.target_success_rate))
+        callbacks.append(StopAtSuccess(config.target_success_rate, finish))
     callbacks += more
     interrupted = False
     try:
@@ -231,6 +244,19 @@ def _learn(
         success_rate=success_rate(model),
         interrupted=interrupted,
     )
+
+
+def _check_finish(config: TrainConfig, worlds: RigidVecEnv) -> None:
+    """Raises UsageError now where the environment would refuse the last part of the run."""
+    if not config.finish_timesteps:
+        return
+    envs = make_vector_env(config.env_id, config.n_envs, **config.last_env_kwargs)
+    try:
+        worlds.check_like(envs)
+    except ValueError as error:
+        raise UsageError(f"finish_env_kwargs is {config.finish_env_kwargs}: {error}") from None
+    finally:
+        envs.close()
 
 
 @contextmanager

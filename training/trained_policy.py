@@ -103,7 +103,7 @@ def _unpickled(
         config = folder.config()
         if algo not in (None, config.algo):
             raise UsageError(f"{file} is of a run of {config.algo}, not of {algo!r}")
-        algo, env_id, env_kwargs = config.algo, env_id or config.env_id, config.env_kwargs
+        algo, env_id, env_kwargs = config.algo, env_id or config.env_id, config.last_env_kwargs
     if algo is None or env_id is None:
         raise UsageError(f"{file} lies in no run folder: say --algo and --env")
 

@@ -85,6 +85,23 @@ class RigidVecEnv(VecEnv):
                 self.reset_infos[world] = new_info
         return _copied(observation), np.array(rewards, dtype=np.float32), dones, info_list
 
+    def replace(self, envs: VectorEnv) -> None:
+        """Closes the vector environment and takes another in its place, to be reset next.
+
+        Raises:
+            ValueError: It has other spaces, or another number of worlds.
+        """
+        self.check_like(envs)
+        self.envs.close()
+        self.envs = envs
+
+    def check_like(self, envs: VectorEnv) -> None:
+        """Raises ValueError where a vector environment can't take the place of the own one."""
+        for name in ("num_envs", "single_observation_space", "single_action_space"):
+            old, new = getattr(self.envs, name), getattr(envs, name)
+            if old != new:
+                raise ValueError(f"{name} is {new}, should be {old}")
+
     def close(self) -> None:
         """Closes the vector environment."""
         self.envs.close()
