@@ -208,12 +208,9 @@ def _tune(options: argparse.Namespace) -> int:
 
     from training.tuning import PART, tune
 
-    # as many steps as were asked for, or a part of those that the settings have
-    short = (
-        config
-        if options.n_timesteps
-        else config.replace(n_timesteps=max(1, config.n_timesteps // PART))
-    )
+    # as many steps as were asked for, or a part of those that the settings have; none to finish on
+    steps = config.n_timesteps if options.n_timesteps else max(1, config.n_timesteps // PART)
+    short = config.replace(n_timesteps=steps, finish_timesteps=0, finish_env_kwargs={})
     best = tune(
         short,
         options.log_folder,
@@ -226,8 +223,13 @@ def _tune(options: argparse.Namespace) -> int:
     )
     if best.settings is not None:
         print(f"# {best.summary}")
-        full = configured(options).n_timesteps
-        print(best.settings.replace(n_timesteps=full).as_yaml(), end="")
+        full = configured(options)
+        settings = best.settings.replace(
+            n_timesteps=full.n_timesteps,
+            finish_timesteps=full.finish_timesteps,
+            finish_env_kwargs=full.finish_env_kwargs,
+        )
+        print(settings.as_yaml(), end="")
     return INTERRUPTED if best.interrupted else 0
 
 

@@ -176,6 +176,12 @@ class PPOConfig(TrainConfig):
     def _check_together(self, source: str) -> None:
         super()._check_together(source)
         rollout = self.n_envs * self.n_steps
+        first = -(-(self.n_timesteps - self.finish_timesteps) // rollout) * rollout
+        if self.finish_timesteps and first >= self.n_timesteps:
+            raise UsageError(
+                f"{source}: {self.env_id}: finish_timesteps is {self.finish_timesteps}, within the "
+                f"last rollout: it should be at least n_envs × n_steps = {rollout}"
+            )
         if self.batch_size > rollout:
             raise UsageError(
                 f"{source}: {self.env_id}: batch_size is {self.batch_size}, should be at most "

@@ -30,7 +30,10 @@ class FinishElsewhere(BaseCallback):
     ):
         super().__init__()
         self.worlds, self.make, self.from_steps, self.seed = worlds, make, from_steps, seed
-        self.finishing = False
+        self.finishing, self.resumed = False, False
+
+    def _on_training_start(self) -> None:
+        self.resumed = self.model.num_timesteps > self.from_steps
 
     def _on_rollout_start(self) -> None:
         if self.finishing or self.model.num_timesteps < self.from_steps:
@@ -43,13 +46,14 @@ class FinishElsewhere(BaseCallback):
             with warnings.catch_warnings():  # of what is meant: these episodes are never to end
                 warnings.simplefilter("ignore")
                 buffer.truncate_last_trajectory()
-        self.worlds.seed(self.seed)
+        if not self.resumed:  # else these episodes would be played again
+            self.worlds.seed(self.seed)
+            model.ep_success_buffer.clear()
+            model.ep_info_buffer.clear()
         model._last_obs = model.env.reset()
         model._last_episode_starts = np.ones(self.worlds.num_envs, dtype=bool)
         if model._vec_normalize_env is not None:
             model._last_original_obs = model._vec_normalize_env.get_original_obs()
-        model.ep_success_buffer.clear()
-        model.ep_info_buffer.clear()
 
     def _on_step(self) -> bool:
         return True

@@ -165,6 +165,8 @@ def read_results(repository: Path) -> list[Result]:
     """
     results = []
     for file in (repository / "results").glob(f"*/*/{RESULT}"):
+        if file.parent.suffix == ".tmp":  # of a process that was killed as it wrote
+            continue
         result = read_result(file)
         if result.folder(repository) != file.parent:
             raise UsageError(f"{file} should lie in {result.folder(repository)}")

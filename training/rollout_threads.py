@@ -22,8 +22,5 @@ class OneThreadRollouts(BaseCallback):
     def _on_rollout_end(self) -> None:
         torch.set_num_threads(self.threads)
 
-    def _on_training_end(self) -> None:
-        torch.set_num_threads(self.threads)  # success may have ended a rollout
-
     def _on_step(self) -> bool:
         return True

@@ -272,11 +272,13 @@ def _naming_full_disks(folder: RunFolder) -> Iterator[None]:
 def _worlds_and_model(
     config: TrainConfig, device: str, num_threads: int | None
 ) -> Iterator[tuple[RigidVecEnv, BaseAlgorithm]]:
+    threads = torch.get_num_threads()
     torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
     worlds = RigidVecEnv(make_vector_env(config.env_id, config.n_envs, **config.env_kwargs))
     try:
         yield worlds, _build(config, _wrapped(worlds, config), _checked(device))
     finally:
+        torch.set_num_threads(threads)
         worlds.close()
 
 

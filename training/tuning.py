@@ -194,8 +194,10 @@ def _study(
     begun = {"algo": config.algo, "env_id": config.env_id, "episodes": episodes}
     _check_begun_alike(study, {**config.as_mapping(), **begun})
     seed = ((config.seed or 0) + len(study.trials)) % SEED_LIMIT  # else it draws the same again
-    study.sampler = optuna.samplers.TPESampler(seed=seed)
-    study.pruner = optuna.pruners.MedianPruner(TRIALS_BEFORE_CUTS, FIRST_LOOKS)
+    running = any(trial.state == optuna.trial.TrialState.RUNNING for trial in study.trials)
+    # beside another process, which began at as many trials, chance alone keeps the two apart
+    study.sampler = optuna.samplers.TPESampler(seed=None if running else seed)
+    study.pruner = optuna.pruners.MedianPruner(TRIALS_BEFORE_CUTS, FIRST_LOOKS + 1)
     return study
 
 

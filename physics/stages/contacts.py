@@ -69,14 +69,15 @@ def make_loop(features, kind, report):
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 k, a, floor = at(stiffness, i), at(damping, i), at(floors, i)
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
-                inverse_mass = 1.0 / at(pair_mass, i)
+                mass, mass_rate = at(pair_mass, i), mass_rates[i]
+                inverse_mass = 1.0 / mass
                 rx, ry, rz, nx, ny, nz, overlap, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, sharp
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
                 if not plane:
-                    inverse_mass += turned_by(
+                    turning = turned_by(
                         at(yielding[0], i),
                         at(yielding[1], i),
                         at(yielding[2], i),
@@ -87,6 +88,8 @@ def make_loop(features, kind, report):
                         ny,
                         nz,
                     )
+                    inverse_mass += turning
+                    mass_rate *= 1.0 / (1.0 + mass * turning)
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -102,7 +105,7 @@ def make_loop(features, kind, report):
                     floor,
                     inverse_mass,
                     h,
-                    mass_rates[i],
+                    mass_rate,
                     memory,
                     loads[i],
                     befores[i],

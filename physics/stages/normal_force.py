@@ -123,7 +123,7 @@ def overlap_force(overlap, approach, k, a, floor, inverse_mass, h, mass_rate, me
         floor: m/s.
         inverse_mass: 1/kg of the pair, at this point if it is its only sample.
         h: s.
-        mass_rate: kg/s, m / (W h).
+        mass_rate: kg/s, m / (W h), of the same mass: else the load that it tells swings.
         memory: m/s, impact speed, negative while separating, 0 while apart.
         load: N, last step's force.
         before: m/s, last step's approach.

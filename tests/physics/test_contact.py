@@ -298,6 +298,29 @@ def test_a_ball_that_meets_a_cube_far_from_its_centre_keeps_the_restitution(arm,
         np.testing.assert_allclose(change, impulse / m, rtol=error)
 
 
+@pytest.mark.parametrize("fidelity", SPRINGS)
+@pytest.mark.parametrize("arm", [(0.0, 0.0), (0.012, 0.012), (0.018, 0.018)])
+def test_a_ball_that_presses_a_cube_far_from_its_centre_presses_steadily(arm, fidelity):
+    """A tool that gains speed evenly; the cube turns away from it, so slowly that it hardly shows.
+
+    The load of a contact is told from the mass that yields there, or it jumps to and fro.
+    """
+    smooth = Material(friction=0.0, restitution=0.5)
+    cube = Body(CUBE, mass=0.1, material=smooth)
+    tool = Drive(Sphere(0.02), 5.0, 500.0, (*arm, 0.04), frequency=60.0, material=smooth)
+    world = World(
+        Scene([cube], [Ground(smooth, -10.0)], drives=[tool], gravity=(0, 0, 0)), fidelity
+    )
+    step, pressed = world.fidelity.substep, []
+    for k in range(int(0.08 / step)):
+        height = 0.04 - 1.0 * ((k + 1) * step) ** 2
+        world.move_drives((*arm, height), step)
+        world.advance(step)
+        pressed.append(world.pressing(0, 1)[0])
+    late = np.array(pressed[len(pressed) // 2 :])
+    assert np.abs(np.diff(late)).max() < 0.2 * late.mean()
+
+
 # --- shapes at rest -----------------------------------------------------------------------------
 
 

@@ -110,3 +110,9 @@ def test_what_the_environment_would_refuse_is_told_at_the_start(quick_ppo, tmp_p
         train(config, tmp_path, quiet=True)
     assert not made
     assert not list(tmp_path.iterdir())
+
+
+def test_a_finish_within_the_last_rollout_is_refused(quick_ppo):
+    with pytest.raises(UsageError, match="finish_timesteps is 79, within the last rollout"):
+        quick_ppo.replace(finish_timesteps=79, finish_env_kwargs=FINER)
+    quick_ppo.replace(finish_timesteps=80, finish_env_kwargs=FINER)
