@@ -1,5 +1,6 @@
 """Torch leaves its second core to the worlds while they are stepped, and has it back after."""
 
+import pytest
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy as Policy
@@ -8,7 +9,8 @@ from training.config import load_config
 from training.train import train
 
 
-def test_rollouts_take_one_thread_and_updates_their_own(tmp_path, monkeypatch):
+@pytest.mark.parametrize("threads", [1, 2])
+def test_rollouts_take_one_thread_and_updates_as_many_as_asked(tmp_path, monkeypatch, threads):
     seen = {"rollout": set(), "update": set()}
 
     def noting(name, function):
@@ -24,6 +26,6 @@ def test_rollouts_take_one_thread_and_updates_their_own(tmp_path, monkeypatch):
         n_envs=8, n_timesteps=800, n_steps=50, batch_size=100
     )
     before = torch.get_num_threads()
-    train(config, tmp_path, num_threads=2, quiet=True)
-    assert seen == {"rollout": {1}, "update": {2}}
+    train(config, tmp_path, num_threads=threads, quiet=True)
+    assert seen == {"rollout": {1}, "update": {threads}}
     assert torch.get_num_threads() == before

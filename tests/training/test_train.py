@@ -2,7 +2,6 @@ import csv
 
 import numpy as np
 import pytest
-import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training import train as train_module
@@ -122,11 +121,6 @@ def test_linear_schedule_falls_to_zero():
 def test_linear_learning_rate_survives_saving(quick_ppo, tmp_path):
     result = train(quick_ppo.replace(learning_rate="lin_3e-4"), tmp_path, quiet=True)
     assert trained_policy(result.folder.path)
-
-
-def test_threads_are_set_as_asked(quick_ppo, tmp_path):
-    train(quick_ppo, tmp_path, num_threads=1, quiet=True)
-    assert torch.get_num_threads() == 1
 
 
 def test_arguments_that_the_environment_refuses_are_named_before_a_folder_is_made(
