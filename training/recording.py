@@ -139,11 +139,13 @@ def _check_place(
                 else f"{place} holds another run of its seed; to put this in its place: "
                 f"rigid-envs results --replace {folder.path}"
             )
-        if other.arguments != config.last_env_kwargs:
-            raise UsageError(
-                f"its arguments are {config.last_env_kwargs}, but {place}, of the same table, "
-                f"has {other.arguments}"
-            )
+        settings = load_config(config.algo, config.env_id, other.folder(repository) / "config.yaml")
+        for name, value in settings.replace(seed=config.seed).as_mapping().items():
+            if (own := config.as_mapping()[name]) != value:
+                raise UsageError(
+                    f"its {name} is {own}, but {place}, of the same table, has {value}; runs of a "
+                    "table differ by their seed alone"
+                )
 
 
 def _share(outcome: np.ndarray) -> dict[str, float]:

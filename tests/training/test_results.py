@@ -234,13 +234,25 @@ def test_runs_that_cannot_be_recorded_are_skipped_with_a_reason(
     assert not list((repository / "results").glob("**/*.tmp"))
 
 
-def test_other_arguments_make_another_table_or_are_refused(repository, runs, quick_ppo):
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"env_kwargs": {"reward_type": "sparse"}}, "its env_kwargs is {'reward_type': 'sparse'}"),
+        ({"gamma": 0.5}, "its gamma is 0.5"),
+    ],
+)
+def test_runs_of_other_settings_are_refused(repository, runs, quick_ppo, change, complaint):
     first, second = sorted((runs / "ppo").iterdir())
     update(repository, first)
-    sparse = quick_ppo.replace(seed=4, env_kwargs={"reward_type": "sparse"})
-    (second / "config.yaml").write_text(sparse.as_yaml())
+    (second / "config.yaml").write_text(quick_ppo.replace(seed=4, **change).as_yaml())
     (said,) = update(repository, second)
-    assert "its arguments are {'reward_type': 'sparse'}, but results/ppo/Test-Reach" in said
+    assert f"{complaint}, but results/ppo/Test-Reach-v0_seed3, of the same table, has" in said
+    assert [result.seed for result in read_results(repository)] == [3]
+
+
+def test_other_arguments_make_another_table(repository, runs, quick_ppo):
+    first, second = sorted((runs / "ppo").iterdir())
+    update(repository, first)
     shorter = quick_ppo.replace(
         seed=4, env_kwargs={"reward_type": "sparse", "max_episode_steps": 5}
     )
