@@ -284,7 +284,10 @@ def _worlds_and_model(
 
 def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
     monitored = VecMonitor(worlds)
-    return VecNormalize(monitored, gamma=config.gamma) if config.normalize else monitored
+    if not config.normalize:
+        return monitored
+    # a replay buffer's rewards would be scaled by what the statistics are when they are sampled
+    return VecNormalize(monitored, norm_reward=config.algo == "ppo", gamma=config.gamma)
 
 
 def _build(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
