@@ -124,7 +124,7 @@ def _section(group: Sequence[Result]) -> str:
             f"| {one.seed} | {one.steps:,} | {one.seconds:.0f} s | "
             f"{100 * one.environment_share:.0f} % | "
             f"{_interval(one.success_at_end)} | {_interval(one.success_at_any_time)} | "
-            f"{one.commit[:10] if one.commit else '–'} |"
+            f"{_short(one.commit)} |"
         )
     if len(group) > 1:
         cells = [
@@ -199,6 +199,13 @@ def _summary(results: Sequence[Result]) -> str:
         film = pictures(first.kind)[1].as_posix()
         films.append(f"![{first.env_id}, {first.algorithm.upper()}]({film})")
     return "\n".join([*lines, "", *films, ""])
+
+
+def _short(commit: str | None) -> str:
+    if commit is None:
+        return "–"
+    digits, dash, dirty = commit.partition("-")
+    return f"{digits[:10]}{dash}{dirty}"
 
 
 def _interval(share: dict[str, float]) -> str:

@@ -239,17 +239,22 @@ def package_versions() -> dict[str, Any]:
 
 
 def git_commit() -> str | None:
-    """The commit of this project's source tree; none if it is installed from elsewhere."""
+    """The commit of this project's source tree, with "-dirty" where tracked files differ from it.
+
+    None if it is installed from elsewhere.
+    """
     source = Path(__file__).resolve().parents[1]
     try:
-        answer = subprocess.run(
-            ["git", "-C", str(source), "rev-parse", "--show-toplevel", "HEAD"],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        top, commit = _git(source, "rev-parse", "--show-toplevel", "HEAD").splitlines()
+        # A site-packages inside somebody's repository must not report that repository's commit.
+        if Path(top).resolve() != source:
+            return None
+        changes = _git(source, "status", "--porcelain", "--untracked-files=no")
     except (OSError, subprocess.CalledProcessError):
         return None
-    # A site-packages inside somebody's repository must not report that repository's commit.
-    top, commit = answer.stdout.splitlines()
-    return commit if Path(top).resolve() == source else None
+    return f"{commit}-dirty" if changes else commit
+
+
+def _git(source: Path, *words: str) -> str:
+    command = ["git", "-C", str(source), *words]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout

@@ -1,11 +1,18 @@
 import json
+import subprocess
 
 import pytest
 
 from training import run_folder
 from training.config import load_config
 from training.errors import UsageError
-from training.run_folder import RunFolder, create_run_folder, latest_run, written_whole
+from training.run_folder import (
+    RunFolder,
+    create_run_folder,
+    git_commit,
+    latest_run,
+    written_whole,
+)
 
 
 def test_each_run_gets_a_folder_of_its_own(tmp_path, quick_ppo):
@@ -40,11 +47,32 @@ def test_the_folder_says_what_made_the_run(tmp_path, quick_ppo):
     assert run["seed"] == 3
     assert run["algo"] == "ppo"
     assert run["command"]
-    assert run["git_commit"] is None or len(run["git_commit"]) == 40
+    assert run["git_commit"] is None or len(run["git_commit"].removesuffix("-dirty")) == 40
     versions = json.loads((folder.path / "versions.json").read_text())
     for package in ("python", "numpy", "numba", "gymnasium", "stable-baselines3", "torch"):
         assert versions[package]
     assert "rigid-envs" in versions
+
+
+def test_the_commit_tells_of_changes_since(tmp_path, monkeypatch):
+    def git(*words):
+        who = ["-c", "user.name=Ada", "-c", "user.email=ada@example.org"]
+        subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True, capture_output=True)
+
+    source = tmp_path / "training" / "run_folder.py"
+    source.parent.mkdir()
+    source.write_text("")
+    monkeypatch.setattr(run_folder, "__file__", str(source))
+    assert git_commit() is None
+    git("init")
+    git("add", ".")
+    git("commit", "-m", "first")
+    commit = git_commit()
+    assert len(commit) == 40
+    (tmp_path / "notes").write_text("untracked")
+    assert git_commit() == commit
+    source.write_text("changed")
+    assert git_commit() == f"{commit}-dirty"
 
 
 def test_latest_run_is_the_one_with_the_highest_number(tmp_path, quick_ppo):
