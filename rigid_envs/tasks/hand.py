@@ -87,11 +87,21 @@ class Hand:
         """Where the carriage's servo pulls to, [count, 3] m."""
         return 0.5 * (now.reference[:, -2] + now.reference[:, -1])
 
+    def opening(self, now: Readout) -> Array:
+        """Between the pads, [count] m."""
+        place = now.position
+        return np.asarray(place[:, -1, 1] - place[:, -2, 1] - 2.0 * self.PAD)
+
+    def slackness(self, now: Readout) -> Array:
+        """What the fingers are asked to open to, as a share [count] of what they are; at most 1."""
+        pulled = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
+        return np.clip(pulled / np.maximum(self.opening(now), 1e-3), 0.0, 1.0)
+
     def observe(self, now: Readout, out: Array) -> None:
         """Writes what `bounds` names, [count, 11]."""
-        place, velocity = now.position, now.linear_velocity
+        velocity = now.linear_velocity
         out[:, 0:3] = self.place(now)
         out[:, 3:6] = 0.5 * (velocity[:, -2] + velocity[:, -1])
-        out[:, 6] = place[:, -1, 1] - place[:, -2, 1] - 2.0 * self.PAD
+        out[:, 6] = self.opening(now)
         out[:, 7] = velocity[:, -1, 1] - velocity[:, -2, 1]
         out[:, 8:11] = self.reference(now)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics import Body, Box, Ground, Material, Readout, Scene, World
-from physics.validation import integer
+from physics.validation import integer, number
 from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
 from rigid_envs.tasks.hand import Hand
@@ -20,7 +20,13 @@ MASS = 0.1  # kg
 CELL = 0.12
 JITTER = 0.01  # m, by which cube or goal may lie beside the middle of its place
 THRESHOLD = 0.02  # m
-REACH = 0.1  # m, over which the shaped terms fall
+# m, over which the shaped terms fall: half of them from afar, half where it must be exact
+FAR, CLOSE = 0.5, 0.05
+# m above its end at which a way over other cubes leads, for a hand and for a cube; and m beside
+# its end at which it may lead down
+OVER_CUBES, OVER_TOWER, DOWN = 0.05, 0.015, 0.04
+# of the terms of a cube, in what is done of its stage
+STAGE = {"reach": 0.25, "grasp": 0.15, "place": 0.4, "release": 0.2}
 PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
 
 
@@ -29,6 +35,9 @@ class Stack(Task):
 
     Args:
         blocks: number of cubes, 2 to 5.
+        begun: share of episodes that start with a tower begun, of one cube or more, all but one at
+            most, each number as often. An easier way in for training: where a tower of one is
+            common, what comes after it is learned too.
     """
 
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
@@ -38,9 +47,10 @@ class Stack(Task):
     # open fingers about a cube would reach the next one
     sizes = (0.5, 1.5)
 
-    def __init__(self, blocks: int = 2) -> None:
+    def __init__(self, blocks: int = 2, begun: float = 0.0) -> None:
         """Lists what is observed of so many cubes."""
         self.blocks = integer("blocks", blocks, low=2)
+        self.begun = number("begun", begun, low=0.0, high=1.0)
         if self.blocks > 5:
             raise ValueError(f"blocks must be at most 5, got {blocks!r}")
         self.actions = self.hand.actions
@@ -52,7 +62,7 @@ class Stack(Task):
             *((f"cube {i} {a}", "m", -1.0, 1.0) for i in range(self.blocks) for a in "xyz"),
             ("released", "m", 0.0, 1.0),
         )
-        self.draws = len(PLACES) + 2 * (self.blocks + 1)
+        self.draws = len(PLACES) + 2 * (self.blocks + 1) + (self.begun > 0.0)
         # never above 0: else it would pay to put the end off where success ends an episode
         self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0, "time": -2.0})
 
@@ -77,19 +87,24 @@ class Stack(Task):
         """
         n, count = self.blocks, len(draws)
         order = np.argsort(draws[:, : len(PLACES)], axis=1)[:, : n + 1]
-        jitter = JITTER * (2.0 * draws[:, len(PLACES) :].reshape(count, n + 1, 2) - 1.0)
+        beside = draws[:, len(PLACES) : len(PLACES) + 2 * (n + 1)].reshape(count, n + 1, 2)
+        jitter = JITTER * (2.0 * beside - 1.0)
         places = PLACES[order] + jitter
         size = world.parameters.size[mask] if world.features.varied else np.ones((count, n))
         position = np.empty((count, n, 3))
         position[:, :, :2] = places[:, :n]
         position[:, :, 2] = HALF * size
-        world.reset(mask)
-        world.set_state(position=position, worlds=mask)
 
         goals = np.ones((count, 3 * n + 1))
         tower = goals[:, :-1].reshape(count, n, 3)
         tower[:, :, :2] = places[:, n, None]
         tower[:, :, 2] = HALF * (2.0 * np.cumsum(size, axis=1) - size)
+        if self.begun:
+            ahead = 1.0 - draws[:, -1] / self.begun  # above 0 in the share, evenly up to 1
+            stand = np.arange(n) < np.ceil(ahead * (n - 1))[:, None]
+            position = np.where(stand[:, :, None], tower, position)
+        world.reset(mask)
+        world.set_state(position=position, worlds=mask)
         return goals
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
@@ -114,29 +129,35 @@ class Stack(Task):
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
-        """`placed`: cubes that stand, from below; `reach`, `grasp` and `place` of the next.
+        """`placed`: cubes that stand, let go, from below; what is done of the next; and `stage`.
 
-        They are 0 to 1, and so is `stage`, all of it in one number.
+        Of the next: `reach`, `grasp`, `place` and `release`, each 0 to 1. `stage`, 0 to 1 too, is
+        all of it in one number.
         """
-        n, hand = self.blocks, self.hand.place(now)
-        goal = [slice(3 * i, 3 * i + 3) for i in range(n)]
-        away = np.array([distance(achieved[:, i], desired[:, i]) for i in goal])
-        reach = np.array([distance(achieved[:, i], hand) for i in goal])
-        placed = np.cumprod(away <= THRESHOLD, axis=0).sum(axis=0)
-        done = placed == n
-        next_one = np.minimum(placed, n - 1)[None]
-        near = _near(np.take_along_axis(reach, next_one, axis=0)[0])
-        place = _near(np.take_along_axis(away, next_one, axis=0)[0])
-        both = self._pressing(world).min(axis=1) > 0.0
-        held = np.take_along_axis(both, next_one, axis=0)[0]
-        free = achieved[:, -1]
-        stage = np.where(done, 0.5 * free, 0.3 * near + 0.2 * held + 0.5 * place)
+        n, hand, worlds = self.blocks, self.hand.place(now), np.arange(len(achieved))
+        cubes, places = (goals[:, :-1].reshape(-1, n, 3) for goals in (achieved, desired))
+        away = np.array([distance(cubes[:, i], places[:, i]) for i in range(n)])
+        pressing = self._pressing(world)
+        placed = np.cumprod((away <= THRESHOLD) & (pressing.max(axis=1) <= 0.0), axis=0).sum(axis=0)
+        done, which = placed == n, np.minimum(placed, n - 1)
+        cube, place = cubes[worlds, which], places[worlds, which]
+        there = away[which, worlds] <= THRESHOLD
+        # a closed hand may press a cube from above, too
+        beside = np.abs(hand[:, 2] - cube[:, 2]) < HALF
+        terms = {
+            "reach": _near(_way(hand, cube, OVER_CUBES)),
+            # a hand that lets go of a cube in its place loses nothing
+            "grasp": there | (beside & (pressing.min(axis=1)[which, worlds] > 0.0)),
+            "place": _near(_way(cube, place, OVER_TOWER)),
+            # a hand that only asks for a little less than a tight grip should feel it
+            "release": there * self.hand.slackness(now),
+        }
+        terms = {name: np.where(done, 1.0, term) for name, term in terms.items()}
+        stage = sum(weight * terms[name] for name, weight in STAGE.items())
         return {
             "placed": placed.astype(float),
-            "reach": np.where(done, 1.0, near),
-            "grasp": np.where(done, free, held).astype(float),
-            "place": np.where(done, 1.0, place),
-            "stage": (placed + stage) / (n + 0.5),
+            **terms,
+            "stage": np.where(done, n, placed + stage) / n,
         }
 
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
@@ -153,9 +174,19 @@ class Stack(Task):
         return np.array(pairs)
 
 
-def _near(apart: Array) -> Array:
-    """1 at no distance, falling to 0 over some `REACH` m."""
-    return 1.0 - np.tanh(apart / REACH)
+def _way(start: Array, end: Array, over: float) -> Array:
+    """Length [n] m of a way from start to end [n, 3] m: up to `over` m above the end, across, down.
+
+    Where it goes straight there, every obstacle between is a place that it doesn't pay to leave.
+    """
+    across = np.sqrt(np.sum((end - start)[:, :2] ** 2, axis=1))
+    level = np.maximum(start[:, 2], end[:, 2] + over * np.minimum(across / DOWN, 1.0))
+    return (level - start[:, 2]) + across + np.abs(level - end[:, 2])
+
+
+def _near(way: Array) -> Array:
+    """1 at no distance, falling to 0 from afar and, as much again, close by."""
+    return 1.0 - 0.5 * (np.minimum(way / FAR, 1.0) + np.tanh(way / CLOSE))
 
 
 def _cube_bounds(name: str) -> tuple[tuple[str, str, float, float], ...]:

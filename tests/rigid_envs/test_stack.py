@@ -38,6 +38,34 @@ def test_the_goal_is_a_tower_that_nothing_holds():
     np.testing.assert_array_equal(observation["desired_goal"][:, -1], 1.0)
 
 
+@pytest.mark.parametrize("blocks", BLOCKS)
+@pytest.mark.parametrize("begun", [0.25, 1.0])
+def test_a_share_of_episodes_starts_with_a_tower_begun(blocks, begun):
+    count = 4000
+    envs = make_vec(count, STACK, blocks=blocks, begun=begun)
+    observation, info = envs.reset(seed=0)
+    cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))
+    stands = np.abs(cubes - tower).max(axis=2) < 1e-6
+    np.testing.assert_array_equal(stands, np.cumprod(stands, axis=1))
+    tall, spread = stands.sum(axis=1), 5.0 * np.sqrt(0.25 / count)
+    assert not info["is_success"].any()
+    assert abs((tall == 0).mean() - (1.0 - begun)) < spread
+    for height in range(1, blocks):
+        assert abs((tall == height).mean() - begun / (blocks - 1)) < spread
+
+    plain, _ = make_vec(count, STACK, blocks=blocks).reset(seed=0)
+    same = tall == 0
+    for key, values in plain.items():
+        np.testing.assert_array_equal(values[same], observation[key][same])
+
+
+def test_a_wrong_share_of_towers_begun_is_named():
+    with pytest.raises(ValueError, match=r"begun must be .* at most 1, got 1\.5"):
+        make(STACK, begun=1.5)
+    with pytest.raises(TypeError, match="begun"):
+        make(STACK, begun="often")
+
+
 def test_a_tower_is_solved_only_when_let_go():
     env = make(STACK, reward_type="dense")
     env.reset(seed=0)
@@ -49,12 +77,15 @@ def test_a_tower_is_solved_only_when_let_go():
     hold, release = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
     for _ in range(5):
         observation, gripped, _, _, info = env.step(hold)
-    assert info["placed"] == 2.0
+    assert info["placed"] == info["grasp"] == 1.0
+    assert info["place"] > 0.9
+    assert info["release"] < 0.2
     assert not info["is_success"]
     assert observation["achieved_goal"][-1] == 0.0
     for _ in range(5):
         observation, reward, _, _, info = env.step(release)
     assert info["is_success"]
+    assert (info["placed"], info["release"]) == (2.0, 1.0)
     assert reward == pytest.approx(0.0)
     assert gripped < reward
 
