@@ -140,7 +140,7 @@ class Stack(Task):
         pressing = self._pressing(world)
         placed = np.cumprod((away <= THRESHOLD) & (pressing.max(axis=1) <= 0.0), axis=0).sum(axis=0)
         done, which = placed == n, np.minimum(placed, n - 1)
-        cube, place = cubes[worlds, which], places[worlds, which]
+        cube, place = (of[worlds, which].astype(float) for of in (cubes, places))
         there = away[which, worlds] <= THRESHOLD
         # a closed hand may press a cube from above, too
         beside = np.abs(hand[:, 2] - cube[:, 2]) < HALF
