@@ -177,7 +177,7 @@ class Stack(Task):
 def _way(start: Array, end: Array, over: float) -> Array:
     """Length [n] m of a way from start to end [n, 3] m: up to `over` m above the end, across, down.
 
-    Where it goes straight there, every obstacle between is a place that it doesn't pay to leave.
+    Straight ways would end at what stands between, or pay a hand for staying down there.
     """
     across = np.sqrt(np.sum((end - start)[:, :2] ** 2, axis=1))
     level = np.maximum(start[:, 2], end[:, 2] + over * np.minimum(across / DOWN, 1.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_envs.rewards import distance
-from rigid_envs.tasks.stack import CELL, HALF, JITTER, THRESHOLD, Stack
+from rigid_envs.tasks.stack import CELL, HALF, JITTER, THRESHOLD, Stack, _way
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
 
@@ -64,6 +64,18 @@ def test_a_wrong_share_of_towers_begun_is_named():
         make(STACK, begun=1.5)
     with pytest.raises(TypeError, match="begun"):
         make(STACK, begun="often")
+
+
+def test_a_way_leads_up_across_and_down():
+    def way(start, end):
+        return _way(np.array([start]), np.array([end]), over=0.05)[0]
+
+    end = (0.3, 0.4, 0.02)
+    assert way(end, end) == 0.0
+    assert way((0.3, 0.4, 0.2), end) == pytest.approx(0.18)  # down
+    assert way((0.0, 0.0, 0.02), end) == pytest.approx(0.05 + 0.5 + 0.05)
+    assert way((0.0, 0.0, 0.07), end) == pytest.approx(0.5 + 0.05)  # up already
+    assert way((0.0, 0.0, 0.2), end) == pytest.approx(0.5 + 0.18)  # higher than it need be
 
 
 def test_a_tower_is_solved_only_when_let_go():
