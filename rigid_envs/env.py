@@ -31,6 +31,8 @@ class RigidEnv(gym.Env[Observation, Array]):
         randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
             see `rigid_envs.randomization.Randomization`.
         observe_parameters: what `randomize` names is observed too.
+        guided: what is left to do is observed too, as the task tells it from both goals. Not for
+            learners that relabel goals (HER): they would read the goal that was.
         **arguments: of the task, as `blocks`.
     """
 
@@ -49,6 +51,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         terminate_on_success: bool = False,
         randomize: Any = None,
         observe_parameters: bool = False,
+        guided: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the world; an episode begins with `reset`."""
@@ -63,6 +66,7 @@ class RigidEnv(gym.Env[Observation, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
+            guided,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, size=render_size
@@ -127,7 +131,7 @@ class RigidEnv(gym.Env[Observation, Array]):
     @property
     def reward(self) -> Reward:
         """How goals and raw terms make the reward; wrappers ask it when goals agree."""
-        return self._runner.task.reward
+        return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
@@ -136,8 +140,7 @@ class RigidEnv(gym.Env[Observation, Array]):
             ValueError: with the dense reward, other goals than those of the info's step.
         """
         runner = self._runner
-        reward = runner.task.reward
-        return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
+        return runner.reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
 
     def render(self) -> Array | None:
         """A frame [480, 480, 3] uint8 in "rgb_array" mode; draws the window in "human" mode."""

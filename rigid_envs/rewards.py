@@ -1,7 +1,7 @@
 """Rewards: one function of goals and named raw terms, for a step and for relabelling."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,19 @@ class Reward:
     Args:
         threshold: m, largest distance that counts as solved.
         weights: of the raw terms, by name.
+        hurry: weight of "time" where success ends an episode: as much below 0 as the others can
+            pay together short of success, or it would pay to put the end off. Elsewhere it would
+            be a constant that a learner's value function has to find again and again.
     """
 
     threshold: float
     weights: Mapping[str, float]
+    hurry: float = 0.0
+
+    def ending(self) -> "Reward":
+        """The reward where success ends an episode."""
+        weights = {**self.weights, "time": self.weights.get("time", 0.0) + self.hurry}
+        return replace(self, weights=weights, hurry=0.0) if self.hurry else self
 
     def success(self, apart: Any) -> Any:
         """Whether goals at these distances [...] m agree."""

@@ -55,6 +55,7 @@ class Runner:
         terminate_on_success: end an episode when it is solved.
         randomize: ranges of parameters that are drawn for each episode, see `Randomization`.
         observe_parameters: what `randomize` names is observed too.
+        guided: what the task's `guide` writes is observed too.
         **arguments: of the task, where it is given by its name or class.
     """
 
@@ -69,6 +70,7 @@ class Runner:
         terminate_on_success: bool = False,
         randomize: Any = None,
         observe_parameters: bool = False,
+        guided: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the world; episodes begin with `reset`."""
@@ -88,6 +90,8 @@ class Runner:
         if not isinstance(terminate_on_success, bool | np.bool_):
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
+        reward = self.task.reward
+        self.reward = reward.ending() if self.terminate_on_success else reward
 
         self.observe_parameters: bool = instance("observe_parameters", observe_parameters, bool)
         if self.observe_parameters and not self.randomization.bounds:
@@ -95,7 +99,10 @@ class Runner:
                 "observe_parameters needs randomize, whose ranges bound what is observed"
             )
         seen = self.randomization.bounds if self.observe_parameters else ()
-        self.bounds = (*self.task.bounds, *seen)
+        self.guided: bool = instance("guided", guided, bool)
+        # last, so that indices hold
+        guides = self.task.guides if self.guided else ()
+        self.bounds = (*self.task.bounds, *seen, *guides)
         low, high = _limits(self.bounds)
         goal_low, goal_high = _limits(self.task.goal_bounds)
         self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
@@ -184,13 +191,16 @@ class Runner:
         hold for, so that `compute_reward` can tell others.
         """
         now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
+        told = split - len(self.task.guides) if self.guided else split
         table = columns((len(self._low),), self.count, np.float32)
         values = table.T[: self.count]
         self.task.observe(self.world, now, values[:, :seen])
         if self.observe_parameters:
-            values[:, seen:split] = self.randomization.observed
+            values[:, seen:told] = self.randomization.observed
         achieved, desired = values[:, split:], self._goals
         achieved[...] = self.task.achieved(self.world, now)
+        if self.guided:
+            self.task.guide(self.world, now, achieved, desired, values[:, told:split])
         outside = clip(table, self._low, self._high, self.count)
         self._apart = distance(achieved, desired)
         # as users expect them, a row for each world
@@ -199,14 +209,14 @@ class Runner:
             "achieved_goal": achieved.copy(),
             "desired_goal": desired.copy(),
         }
-        success: Array = self.task.reward.success(self._apart)
+        success: Array = self.reward.success(self._apart)
         info: dict[str, Array] = {
             "is_success": success,
             "success": success,
             "out_of_bounds": outside,
             **self.task.terms(self.world, now, achieved, desired, self._apart),
         }
-        if self.reward_type == "dense" and self.task.reward.of_task:
+        if self.reward_type == "dense" and self.reward.of_task:
             info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
         return observation, info
 
@@ -260,11 +270,10 @@ class Runner:
         if begun is not None:
             self.reset(begun)
         observation, info = self.observe()
-        reward = self.task.reward
         if self.reward_type == "sparse":
-            rewards = reward.sparse(info["is_success"])
+            rewards = self.reward.sparse(info["is_success"])
         else:
-            rewards = reward.dense(info["is_success"], self._apart, info)
+            rewards = self.reward.dense(info["is_success"], self._apart, info)
         if self.terminate_on_success:
             terminated = info["is_success"].copy()
         else:

@@ -38,6 +38,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
             see `rigid_envs.randomization.Randomization`.
         observe_parameters: what `randomize` names is observed too.
+        guided: what is left to do is observed too, as the task tells it from both goals. Not for
+            learners that relabel goals (HER): they would read the goal that was.
         autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as gymnasium.vector.AutoresetMode.
         threads: to share the worlds out over; all cores if None.
         **arguments: of the task, as `blocks`.
@@ -66,6 +68,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         threads: int | None = None,
         randomize: Any = None,
         observe_parameters: bool = False,
+        guided: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the worlds; episodes begin with `reset`."""
@@ -83,6 +86,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
+            guided,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, render_worlds, render_size
@@ -198,7 +202,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     @property
     def reward(self) -> Reward:
         """How goals and raw terms make the reward; wrappers ask it when goals agree."""
-        return self._runner.task.reward
+        return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
@@ -207,8 +211,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             ValueError: with the dense reward, other goals than those of the info's step.
         """
         runner = self._runner
-        reward = runner.task.reward
-        return reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
+        return runner.reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
 
     def render(self) -> tuple[Array, ...] | None:
         """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them as a grid.

@@ -1,9 +1,8 @@
 """Training settings: typed, read from YAML keyed by environment id, and checked before use.
 
 The schema is rl-baselines3-zoo's, except that network settings are given as a mapping and never
-evaluated as code. What the zoo hands on to Stable-Baselines3, which would refuse it, may stand
-beside the environments instead of among their settings: `target_success_rate`, keyed by
-environment id too.
+evaluated as code. What the zoo would hand on to Stable-Baselines3, which would refuse it, may stand
+beside the environments instead of among their settings, keyed by environment id too.
 """
 
 import dataclasses
@@ -35,11 +34,15 @@ PACKAGED = Path(__file__).resolve().parents[1] / "configs"
 Not by importlib.resources: where the project is installed for editing it cannot read a folder
 without code, and a `configs` folder of the user's own would come first.
 """
-TARGET = "target_success_rate"
+BESIDE = ("target_success_rate", "finish_timesteps", "finish_env_kwargs")
+"""Settings of our own that may stand beside the environments, each keyed by their ids."""
+BOUNDED = "training.bounded.BoundedPolicy"
+"""By where it is found, as the zoo asks for what is not Stable-Baselines3's."""
 NETWORK = {
     "net_arch": widths,
     "activation": choice("tanh", "relu", "elu"),
     "log_std_init": number(),
+    "least_std": number(at_least=0),
 }
 HINDSIGHT = {
     "n_sampled_goal": integer(1),
@@ -63,21 +66,21 @@ class TrainConfig:
     env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments of the environment: reward_type, fidelity, ..."""
     finish_timesteps: int = setting(integer(0), 0)
-    """Of these steps so many, the last, are trained with `finish_env_kwargs` too."""
+    """Of these steps so many, the last, are trained with `finish_env_kwargs` too, at least."""
     finish_env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments over `env_kwargs` to finish with, as a finer fidelity; they are the policy's."""
     normalize: bool = setting(flag, False)
     """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
     """Stop early when this share of the last 1,000 (or n_envs, if more) episodes succeed; where the
-    run finishes on other arguments, of those episodes."""
+    run finishes on other arguments, begin with those early, and stop when it holds there too."""
     seed: int | None = setting(optional(integer(0)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy", "MlpPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3; goal environments need MultiInputPolicy."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation, which is by default
-    Stable-Baselines3's: tanh for PPO, relu for SAC."""
+    Stable-Baselines3's: tanh for PPO, relu for SAC; least_std of BoundedPolicy."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -156,6 +159,9 @@ class PPOConfig(TrainConfig):
 
     algo: ClassVar[str] = "ppo"
 
+    policy: str = setting(choice("MultiInputPolicy", "MlpPolicy", BOUNDED), "MultiInputPolicy")
+    """Policy class; training.bounded.BoundedPolicy is one for goal environments whose mean action
+    stays within bounds."""
     n_steps: int = setting(integer(1), 2048)
     """Steps that each world takes between two updates."""
     n_epochs: int = setting(integer(1), 10)
@@ -175,6 +181,11 @@ class PPOConfig(TrainConfig):
 
     def _check_together(self, source: str) -> None:
         super()._check_together(source)
+        if "least_std" in self.policy_kwargs and self.policy != BOUNDED:
+            raise UsageError(
+                f"{source}: {self.env_id}: policy_kwargs has least_std, "
+                f"should go with policy: {BOUNDED}"
+            )
         rollout = self.n_envs * self.n_steps
         first = -(-(self.n_timesteps - self.finish_timesteps) // rollout) * rollout
         if self.finish_timesteps and first >= self.n_timesteps:
@@ -219,6 +230,11 @@ class SACConfig(TrainConfig):
                 f"{source}: {self.env_id}: replay_buffer_kwargs is {self.replay_buffer_kwargs}, "
                 "should go with replay_buffer_class: HerReplayBuffer"
             )
+        if self.replay_buffer_class is not None and self.env_kwargs.get("guided"):
+            raise UsageError(
+                f"{source}: {self.env_id}: env_kwargs has guided: true, should be without: "
+                "what guides is told of the goal that was, and HerReplayBuffer puts others in place"
+            )
 
 
 ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}
@@ -242,37 +258,41 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
         )
     source = str(path) if path is not None else f"configs/{algo}.yaml"
     entries = _read_yaml(path if path is not None else PACKAGED / f"{algo}.yaml", source)
-    targets = entries.pop(TARGET, {})
+    beside = {key: entries.pop(key, {}) for key in BESIDE}
     names = [str(key) for key in entries]
     if not names:
         raise UsageError(f"{source}: should be a mapping from environment ids to settings")
-    if not isinstance(targets, dict):
-        raise UsageError(f"{source}: {TARGET} is {targets!r}, should be keyed by environment id")
-    for other in targets:
-        if other not in entries:
-            raise UsageError(
-                f"{source}: {TARGET}: no settings for environment {other!r}; "
-                f"did you mean {nearest(str(other), names)!r}?"
-            )
+    for key, values in beside.items():
+        if not isinstance(values, dict):
+            raise UsageError(f"{source}: {key} is {values!r}, should be keyed by environment id")
+        for other in values:
+            if other not in entries:
+                raise UsageError(
+                    f"{source}: {key}: no settings for environment {other!r}; "
+                    f"did you mean {nearest(str(other), names)!r}?"
+                )
     if env_id not in entries:
         raise UsageError(
             f"{source}: no settings for environment {env_id!r}; "
             f"did you mean {nearest(env_id, names)!r}?"
         )
-    values = entries[env_id]
-    if not isinstance(values, dict):
-        raise UsageError(f"{source}: {env_id} is {values!r}, should be a mapping of settings")
-    if env_id in targets:
-        if TARGET in values:
-            raise UsageError(f"{source}: {env_id}: {TARGET} is given twice, should be given once")
-        values = {**values, TARGET: targets[env_id]}
-    return ALGORITHMS[algo].from_mapping(env_id, values, source)
+    settings = entries[env_id]
+    if not isinstance(settings, dict):
+        raise UsageError(f"{source}: {env_id} is {settings!r}, should be a mapping of settings")
+    for key, values in beside.items():
+        if env_id in values:
+            if key in settings:
+                raise UsageError(
+                    f"{source}: {env_id}: {key} is given twice, should be given once"
+                )
+            settings = {**settings, key: values[env_id]}
+    return ALGORITHMS[algo].from_mapping(env_id, settings, source)
 
 
 def packaged_environments(algo: str) -> list[str]:
     """Ids of the environments that an algorithm's packaged file has settings for."""
     source = f"configs/{algo}.yaml"
-    return [name for name in _read_yaml(PACKAGED / f"{algo}.yaml", source) if name != TARGET]
+    return [name for name in _read_yaml(PACKAGED / f"{algo}.yaml", source) if name not in BESIDE]
 
 
 def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:

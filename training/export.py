@@ -12,11 +12,13 @@ from gymnasium import spaces
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.sac.policies import SACPolicy
 
+from training.bounded import BoundedPolicy
 from training.config import TrainConfig
 from training.errors import UsageError
 from training.policy_file import SUFFIX, PolicyFile, load_policy_file
-from training.policy_header import SQUASHING, Environment, Header, Network, Normalization, Success
+from training.policy_header import Environment, Header, Network, Normalization, Success
 from training.run_folder import RunFolder, git_commit, package_versions, written_whole
 
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu", torch.nn.ELU: "elu"}
@@ -104,7 +106,7 @@ def policy_file_of(
         network=Network(
             widths=[layers[0][0].shape[1], *(len(biases) for _, biases in layers)],
             activation=activation,
-            squashing=SQUASHING[config.algo],
+            squashing="tanh" if isinstance(model.policy, SACPolicy | BoundedPolicy) else "clip",
             low=[float(x) for x in actions.low.flatten()],
             high=[float(x) for x in actions.high.flatten()],
         ),

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-SQUASHING = {"ppo": "clip", "sac": "tanh"}
-"""By algorithm, how the network's output becomes an action: cut to its bounds, or tanh."""
+SQUASHING = {"ppo": ("clip", "tanh"), "sac": ("tanh",)}
+"""By algorithm, how the network's output may become an action: cut to its bounds, or tanh."""
 ACTIVATION_NAMES = ("tanh", "relu", "elu")
 
 
@@ -153,7 +153,7 @@ def _network(value: Any, algorithm: str) -> Network:
     network = Network(
         _integers(fields["widths"], "network.widths"),
         _one_of(fields["activation"], "network.activation", ACTIVATION_NAMES),
-        _one_of(fields["squashing"], "network.squashing", (SQUASHING[algorithm],)),
+        _one_of(fields["squashing"], "network.squashing", SQUASHING[algorithm]),
         [_number(x, "network.low") for x in _list(fields["low"], "network.low")],
         [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
     )

@@ -86,7 +86,8 @@ class StopAtSuccess(BaseCallback):
 
     Args:
         target: Share of episodes.
-        finish: Where the run is to finish on other worlds, which of them counts.
+        finish: Where the run is to finish on other worlds: reached before, the target begins that
+            part, and only reached in it, it ends the run.
     """
 
     def __init__(self, target: float, finish: FinishElsewhere | None = None):
@@ -97,9 +98,13 @@ class StopAtSuccess(BaseCallback):
 
     def _on_rollout_end(self) -> None:
         episodes = self.model.ep_success_buffer
-        counts = self.finish is None or self.finish.finishing
-        if counts and episodes is not None and len(episodes) == episodes.maxlen:
-            self.reached = bool(np.mean(episodes) >= self.target)
+        if episodes is None or len(episodes) < (episodes.maxlen or 0):
+            return
+        reached = bool(np.mean(episodes) >= self.target)
+        if self.finish is None or self.finish.finishing:
+            self.reached = reached
+        elif reached:
+            self.finish.from_steps = 0
 
     def _on_step(self) -> bool:
         # Only now, a step into the next rollout: the update with the last one should not be lost.

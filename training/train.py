@@ -21,8 +21,9 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from stable_baselines3.her import HerReplayBuffer
 
 from training.bootstrap import BatchedTimeoutBootstrap
+from training.bounded import BoundedPolicy
 from training.checkpoint import PeriodicCheckpoint, save_checkpoint
-from training.config import PPOConfig, SACConfig, TrainConfig
+from training.config import BOUNDED, PPOConfig, SACConfig, TrainConfig
 from training.environments import make_vector_env
 from training.errors import UsageError
 from training.export import policy_file_of
@@ -292,7 +293,7 @@ def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
 
 def _build(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
     common: dict[str, Any] = {
-        "policy": config.policy,
+        "policy": BoundedPolicy if config.policy == BOUNDED else config.policy,
         "env": env,
         "learning_rate": _schedule(config.learning_rate),
         "batch_size": config.batch_size,

@@ -92,10 +92,14 @@ class Hand:
         place = now.position
         return np.asarray(place[:, -1, 1] - place[:, -2, 1] - 2.0 * self.PAD)
 
+    def asked(self, now: Readout) -> Array:
+        """What the fingers are asked to open to, [count] m."""
+        asked = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
+        return np.clip(asked, 0.0, self.widest)
+
     def slackness(self, now: Readout) -> Array:
         """What the fingers are asked to open to, as a share [count] of what they are; at most 1."""
-        pulled = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
-        return np.clip(pulled / np.maximum(self.opening(now), 1e-3), 0.0, 1.0)
+        return np.minimum(self.asked(now) / np.maximum(self.opening(now), 1e-3), 1.0)
 
     def observe(self, now: Readout, out: Array) -> None:
         """Writes what `bounds` names, [count, 11]."""

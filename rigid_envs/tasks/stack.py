@@ -1,6 +1,7 @@
 """Stack: a gripper builds a tower of cubes at a goal."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,14 +21,29 @@ MASS = 0.1  # kg
 CELL = 0.12
 JITTER = 0.01  # m, by which cube or goal may lie beside the middle of its place
 THRESHOLD = 0.02  # m
-# m, over which the shaped terms fall: half of them from afar, half where it must be exact
-FAR, CLOSE = 0.5, 0.05
-# m above its end at which a way over other cubes leads, for a hand and for a cube; and m beside
-# its end at which it may lead down
-OVER_CUBES, OVER_TOWER, DOWN = 0.05, 0.015, 0.04
+NEAR = 0.15  # m of way, in which the shaped terms fall to 1/e
+# m above its end at which a way over other cubes leads; m in which it may lead down, to half a
+# cube beside its end; and how many times a way up counts: what stays low runs into cubes
+OVER, DOWN, CLIMB = 0.05, 0.04, 3.0
 # of the terms of a cube, in what is done of its stage
 STAGE = {"reach": 0.25, "grasp": 0.15, "place": 0.4, "release": 0.2}
 PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
+
+
+class Next(NamedTuple):
+    """Of each world's next cube: the lowest that isn't placed, or the last where all are.
+
+    Attributes:
+        placed: [count] cubes that stand, let go, from below.
+        cube: [count, 3] m, where it is.
+        place: [count, 3] m, where it belongs.
+        held: [count] whether both fingers press it, beside it.
+    """
+
+    placed: Array
+    cube: Array
+    place: Array
+    held: Array
 
 
 class Stack(Task):
@@ -46,6 +62,11 @@ class Stack(Task):
     # below, a cube beside the tower would be within the threshold of its place on it; above, the
     # open fingers about a cube would reach the next one
     sizes = (0.5, 1.5)
+    guides = (
+        *((f"hand to next cube {a}", "m", -2.0, 2.0) for a in "xyz"),
+        *((f"next cube to its place {a}", "m", -2.0, 2.0) for a in "xyz"),
+        ("share placed", "", 0.0, 1.0),
+    )
 
     def __init__(self, blocks: int = 2, begun: float = 0.0) -> None:
         """Lists what is observed of so many cubes."""
@@ -63,8 +84,7 @@ class Stack(Task):
             ("released", "m", 0.0, 1.0),
         )
         self.draws = len(PLACES) + 2 * (self.blocks + 1) + (self.begun > 0.0)
-        # never above 0: else it would pay to put the end off where success ends an episode
-        self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0, "time": -2.0})
+        self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0}, hurry=-2.0)
 
     def scene(self) -> Scene:
         """Cubes on the ground, and an open gripper above them."""
@@ -126,6 +146,15 @@ class Stack(Task):
         free = self._pressing(world).max(axis=(0, 1)) <= 0.0
         return np.concatenate([*cubes, free[:, None]], axis=1)
 
+    def guide(
+        self, world: World, now: Readout, achieved: Array, desired: Array, out: Array
+    ) -> None:
+        """The way to the next cube, its way to its place, and how much of the tower stands."""
+        of = self._next(world, now, achieved, desired)
+        out[:, 0:3] = of.cube - self.hand.place(now)
+        out[:, 3:6] = of.place - of.cube
+        out[:, 6] = of.placed / self.blocks
+
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
     ) -> dict[str, Array]:
@@ -134,30 +163,25 @@ class Stack(Task):
         Of the next: `reach`, `grasp`, `place` and `release`, each 0 to 1. `stage`, 0 to 1 too, is
         all of it in one number.
         """
-        n, hand, worlds = self.blocks, self.hand.place(now), np.arange(len(achieved))
-        cubes, places = (goals[:, :-1].reshape(-1, n, 3) for goals in (achieved, desired))
-        away = np.array([distance(cubes[:, i], places[:, i]) for i in range(n)])
-        pressing = self._pressing(world)
-        placed = np.cumprod((away <= THRESHOLD) & (pressing.max(axis=1) <= 0.0), axis=0).sum(axis=0)
-        done, which = placed == n, np.minimum(placed, n - 1)
-        cube, place = (of[worlds, which].astype(float) for of in (cubes, places))
-        there = away[which, worlds] <= THRESHOLD
-        # a closed hand may press a cube from above, too
-        beside = np.abs(hand[:, 2] - cube[:, 2]) < HALF
+        n, hand, of = self.blocks, self.hand.place(now), self._next(world, now, achieved, desired)
+        done, there = of.placed == n, distance(of.cube, of.place) <= THRESHOLD
+        # fingers that stand open about a cube should feel that they could close
+        about = np.all(np.abs(hand - of.cube) < HALF, axis=1)
+        closing = about * np.minimum(1.0 - self.hand.asked(now) / self.hand.widest, 0.5)
         terms = {
-            "reach": _near(_way(hand, cube, OVER_CUBES)),
+            "reach": _near(_way(hand, of.cube)),
             # a hand that lets go of a cube in its place loses nothing
-            "grasp": there | (beside & (pressing.min(axis=1)[which, worlds] > 0.0)),
-            "place": _near(_way(cube, place, OVER_TOWER)),
+            "grasp": np.where(there | of.held, 1.0, closing),
+            "place": _near(_way(of.cube, of.place)),
             # a hand that only asks for a little less than a tight grip should feel it
             "release": there * self.hand.slackness(now),
         }
         terms = {name: np.where(done, 1.0, term) for name, term in terms.items()}
         stage = sum(weight * terms[name] for name, weight in STAGE.items())
         return {
-            "placed": placed.astype(float),
+            "placed": of.placed.astype(float),
             **terms,
-            "stage": np.where(done, n, placed + stage) / n,
+            "stage": np.where(done, n, of.placed + stage) / n,
         }
 
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
@@ -167,6 +191,19 @@ class Stack(Task):
         halves = np.full((self.blocks, 3), HALF) * size[:, None]
         return [Ghost(h, p, c) for h, p, c in zip(halves, places, BODY_COLORS, strict=False)]
 
+    def _next(self, world: World, now: Readout, achieved: Array, desired: Array) -> Next:
+        """What is to be done next, of goals [count, goal]."""
+        n, worlds = self.blocks, np.arange(len(achieved))
+        cubes, places = (goals[:, :-1].reshape(-1, n, 3) for goals in (achieved, desired))
+        stand = np.array([distance(cubes[:, i], places[:, i]) <= THRESHOLD for i in range(n)])
+        # closed fingers may press a cube from above, and those about one the cube below it
+        beside = np.abs(cubes[:, :, 2].T - self.hand.place(now)[:, 2]) < HALF
+        held = beside & (self._pressing(world).min(axis=1) > 0.0)
+        placed = np.cumprod(stand & ~held, axis=0).sum(axis=0)
+        which = np.minimum(placed, n - 1)
+        cube, place = (of[worlds, which].astype(float) for of in (cubes, places))
+        return Next(placed, cube, place, held[which, worlds])
+
     def _pressing(self, world: World) -> Array:
         """[blocks, 2, count] N with which each finger presses each cube."""
         n = self.blocks
@@ -174,19 +211,20 @@ class Stack(Task):
         return np.array(pairs)
 
 
-def _way(start: Array, end: Array, over: float) -> Array:
-    """Length [n] m of a way from start to end [n, 3] m: up to `over` m above the end, across, down.
+def _way(start: Array, end: Array) -> Array:
+    """Length [n] m of a way from start to end [n, 3] m, over what stands between: up, across, down.
 
-    Straight ways would end at what stands between, or pay a hand for staying down there.
+    A straight way would end at another cube, or pay a hand for staying down beside the tower.
     """
     across = np.sqrt(np.sum((end - start)[:, :2] ** 2, axis=1))
-    level = np.maximum(start[:, 2], end[:, 2] + over * np.minimum(across / DOWN, 1.0))
-    return (level - start[:, 2]) + across + np.abs(level - end[:, 2])
+    over = OVER * np.clip((across - HALF) / DOWN, 0.0, 1.0)
+    level = np.maximum(start[:, 2], end[:, 2] + over)
+    return CLIMB * (level - start[:, 2]) + across + np.abs(level - end[:, 2])
 
 
 def _near(way: Array) -> Array:
-    """1 at no distance, falling to 0 from afar and, as much again, close by."""
-    return 1.0 - 0.5 * (np.minimum(way / FAR, 1.0) + np.tanh(way / CLOSE))
+    """1 at no distance; 1/e less with every `NEAR` m of way."""
+    return np.exp(-way / NEAR)
 
 
 def _cube_bounds(name: str) -> tuple[tuple[str, str, float, float], ...]:

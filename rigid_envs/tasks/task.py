@@ -22,6 +22,7 @@ class Task(ABC):
         actions: names of the action's components, each within [-1, 1].
         bounds: name, unit, low and high of every component of the observation, in order.
         goal_bounds: likewise of a goal.
+        guides: likewise of what `guide` writes; by default the way from achieved to desired goal.
         draws: random numbers that one episode's start takes.
         reward: how goals and reward terms make a reward.
         camera: that sees all of the task.
@@ -40,6 +41,10 @@ class Task(ABC):
     reward: Reward
     camera: Camera = Camera()
     sizes: tuple[float, float] | None = None
+
+    @property
+    def guides(self) -> tuple[tuple[str, str, float, float], ...]:
+        return tuple((f"{name} to go", unit, a - b, b - a) for name, unit, a, b in self.goal_bounds)
 
     @abstractmethod
     def scene(self) -> Scene:
@@ -78,6 +83,12 @@ class Task(ABC):
 
         `apart` [count] m is the distance of the goals, which every reward needs anyway.
         """
+
+    def guide(
+        self, world: World, now: Readout, achieved: Array, desired: Array, out: Array
+    ) -> None:
+        """Writes what is left to do [count, guides], of goals [count, goal]."""
+        out[...] = desired - achieved
 
     def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
         """What marks the goal [goal] in a picture of world `index`; by default, a place."""

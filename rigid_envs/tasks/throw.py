@@ -41,8 +41,8 @@ class Throw(Task):
     draws = 2
     # above, the fingers would hardly open wider than the ball
     sizes = (0.5, 1.75)
-    # time makes it cost to hold the ball out at a near target, where success ends an episode
-    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0, "time": -1.0})
+    # in a hurry it costs to hold the ball out at a near target
+    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 1.0}, hurry=-1.0)
 
     def scene(self) -> Scene:
         """A ball between the pads of a hand above the ground."""

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from rigid_envs.rewards import Reward, distance
-from tests.rigid_envs.rollout import IDS, REWARDS, make, make_vec, random_actions, steps_of
+from tests.rigid_envs.rollout import (
+    IDS,
+    PUSH,
+    REWARDS,
+    STACK,
+    THROW,
+    make,
+    make_vec,
+    random_actions,
+    steps_of,
+)
 
 REWARD = Reward(threshold=0.05, weights={"success": 1.0, "distance": 10.0, "reach": 0.3})
 ORIGIN = np.zeros(3, dtype=np.float32)
@@ -141,6 +151,21 @@ def test_dense_reward_that_goals_tell_can_be_relabelled():
     apart = distance(achieved, desired)
     expected = (apart <= 0.05) - 2.0 * apart - 1.0
     np.testing.assert_allclose(reward.compute("dense", achieved, desired, None), expected)
+
+
+@pytest.mark.parametrize(("env_id", "hurry"), [(PUSH, 0.0), (STACK, 2.0), (THROW, 1.0)])
+def test_steps_cost_where_success_ends_the_episode(env_id, hurry):
+    paid = []
+    for ends in (False, True):
+        envs = make_vec(4, env_id, reward_type="dense", terminate_on_success=ends)
+        envs.reset(seed=3)
+        actions = np.zeros(envs.action_space.shape, dtype=np.float32)
+        observation, reward, _, _, info = envs.step(actions)
+        goals_of_step = observation["achieved_goal"], observation["desired_goal"]
+        np.testing.assert_array_equal(envs.compute_reward(*goals_of_step, info), reward)
+        assert envs.reward.weights.get("time", 0.0) == (-hurry if ends else 0.0)
+        paid.append(reward)
+    np.testing.assert_allclose(paid[0] - paid[1], hurry, rtol=1e-6)
 
 
 def test_the_last_info_of_an_ended_episode_tells_its_goals():

@@ -15,8 +15,10 @@ from tests.rigid_envs.rollout import (
     PRESETS,
     PUSH,
     REWARDS,
+    THROW,
     assert_same,
     assert_untouched,
+    make,
     make_vec,
     one_world,
     push_blindly,
@@ -343,3 +345,19 @@ def test_a_copy_goes_on_by_itself_to_the_last_bit(env_id, clone):
     twin = clone(envs)
     expected = list(steps_of(envs, actions[20:]))
     assert_same(list(steps_of(twin, actions[20:])), expected)
+
+
+@pytest.mark.parametrize("env_id", [PUSH, THROW])
+def test_guides_tell_the_way_to_the_goal_after_all_else(env_id):
+    kwargs = {"randomize": {"mass": (0.5, 2.0)}, "observe_parameters": True}
+    plain, envs = (make_vec(7, env_id, guided=guided, **kwargs) for guided in (False, True))
+    before, (observation, _) = plain.reset(seed=0)[0], envs.reset(seed=0)
+    split = before["observation"].shape[1]
+    np.testing.assert_array_equal(observation["observation"][:, :split], before["observation"])
+    to_go = observation["desired_goal"] - observation["achieved_goal"]
+    np.testing.assert_array_equal(observation["observation"][:, split:], to_go)
+    single = make(env_id, guided=True, **kwargs)
+    assert single.observation_space == envs.single_observation_space
+    assert envs.observation_space.contains(observation)
+    with pytest.raises(TypeError, match="guided must be"):
+        make(env_id, guided="yes")

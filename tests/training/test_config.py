@@ -159,6 +159,13 @@ def test_hindsight_settings_without_hindsight_are_refused(write_yaml):
         load(write_yaml, "{n_timesteps: 100, replay_buffer_kwargs: {n_sampled_goal: 4}}", "sac")
 
 
+def test_hindsight_and_guides_are_refused_together(write_yaml):
+    text = "{n_timesteps: 100, replay_buffer_class: HerReplayBuffer, env_kwargs: {guided: true}}"
+    with pytest.raises(UsageError, match=r"env_kwargs has guided: true, should be without"):
+        load(write_yaml, text, "sac")
+    assert load(write_yaml, text.replace("guided: true", "guided: false"), "sac")
+
+
 def test_unknown_algorithm_and_environment_name_the_nearest():
     with pytest.raises(UsageError, match=r"'pp0'; did you mean 'ppo'\?"):
         load_config("pp0", ENV)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.training.reach import ReachVectorEnv
 from training import cli
-from training.config import ALGORITHMS, load_config, packaged_environments
+from training.config import BOUNDED, ALGORITHMS, load_config, packaged_environments
 from training.errors import UsageError
 from training.evaluate import evaluate
 from training.policy_file import load_policy_file, read_policy
@@ -77,6 +77,17 @@ def test_a_file_acts_as_ppo_does(quick_ppo, tmp_path, normalize, activation):
         action = read_policy(folder.policy).act(observations(scale=scale))
         assert action.dtype == np.float32
         np.testing.assert_allclose(action, expected.act(observations(scale=scale)), atol=1e-6)
+
+
+def test_a_file_acts_as_a_bounded_policy_does(quick_ppo, tmp_path):
+    network = {"net_arch": [16, 8], "least_std": 0.1}
+    config = quick_ppo.replace(policy=BOUNDED, policy_kwargs=network, learning_rate=0.05)
+    folder = train(config, tmp_path, quiet=True).folder
+    expected = trained_policy(folder.model, trust_pickle=True)
+    for scale in (0.3, 3.0):
+        action = read_policy(folder.policy).act(observations(scale=scale))
+        np.testing.assert_allclose(action, expected.act(observations(scale=scale)), atol=1e-6)
+    assert 0.1 < np.abs(action).max() <= 1.0
 
 
 @pytest.mark.parametrize("normalize", [False, True])
@@ -183,7 +194,8 @@ def test_a_header_that_was_made_up_is_refused_or_acts(kept, tmp_path, field, val
     [
         ({"algorithm": "td4"}, "algorithm is 'td4', should be ppo or sac"),
         ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
-        ({"network__squashing": "tanh"}, "squashing is 'tanh', should be clip"),
+        ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or tanh"),
+        ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         ({"network__widths": [6, 64, 32, 2]}, "bytes of numbers"),
         ({"network__widths": [7, 64, 64, 2]}, "begins with 7, should be 6"),
         ({"network__widths": [6, 2**40, 2**40, 2]}, "bytes of numbers"),

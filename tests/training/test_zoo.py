@@ -35,6 +35,8 @@ for env_id in env_ids:
         name: value(1.0) if name in ("learning_rate", "clip_range") else value
         for name, value in settings.items()
     }
+    if isinstance(settings["policy"], type):
+        settings["policy"] = f"{settings['policy'].__module__}.{settings['policy'].__name__}"
     if "replay_buffer_class" in settings:
         settings["replay_buffer_class"] = settings["replay_buffer_class"].__name__
     settings |= {"n_envs": manager.n_envs, "n_timesteps": manager.n_timesteps}

@@ -1,0 +1,55 @@
+"""Actions of a bounded policy stay where they can be learned from."""
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+from tests.training.reach import ReachVectorEnv
+from training.bounded import BoundedPolicy
+from training.config import BOUNDED
+from training.errors import UsageError
+from training.train import train
+from training.vec_env import RigidVecEnv
+
+LEAST = 0.2
+
+
+@pytest.fixture
+def model() -> PPO:
+    env = RigidVecEnv(ReachVectorEnv(4))
+    return PPO(BoundedPolicy, env, policy_kwargs={"least_std": LEAST, "log_std_init": 0.0})
+
+
+def distribution(model: PPO):
+    return model.policy.get_distribution(model.policy.obs_to_tensor(model.env.reset())[0])
+
+
+def test_the_mean_stays_within_bounds_and_the_spread_above_its_floor(model):
+    with torch.no_grad():
+        model.policy.action_net.bias[:] = torch.tensor([5.0, -0.5])
+        model.policy.action_net.weight[:] = 0.0
+        model.policy.log_std[:] = torch.tensor([0.0, -20.0])
+    of = distribution(model).distribution
+    np.testing.assert_allclose(of.mean.detach()[0], np.tanh([5.0, -0.5]), rtol=1e-6)
+    np.testing.assert_allclose(of.stddev.detach()[0], [1.0 + LEAST, LEAST], rtol=1e-6)
+
+
+def test_the_spread_can_be_learned_at_its_floor(model):
+    with torch.no_grad():
+        model.policy.log_std[:] = -3.0
+    distribution(model).log_prob(torch.full((4, 2), 0.9)).sum().backward()
+    assert (model.policy.log_std.grad.abs() > 0.0).all()
+
+
+def test_a_saved_policy_keeps_its_floor(model, tmp_path):
+    model.save(tmp_path / "model.zip")
+    assert PPO.load(tmp_path / "model.zip").policy.least_std == LEAST
+
+
+def test_a_run_keeps_bounded_policies_and_others_have_no_floor(quick_ppo, tmp_path):
+    config = quick_ppo.replace(policy=BOUNDED, policy_kwargs={"least_std": LEAST})
+    folder = train(config, tmp_path, quiet=True).folder
+    assert folder.config() == config
+    with pytest.raises(UsageError, match=r"has least_std, should go with policy: .*Bounded"):
+        quick_ppo.replace(policy_kwargs={"least_std": LEAST})
