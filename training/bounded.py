@@ -8,7 +8,7 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 
 
 class BoundedPolicy(MultiInputActorCriticPolicy):
-    """Draws actions within ±1 about tanh of what the network gives, spread by no less than a floor.
+    """Draws actions about x / (1 + |x|) of what the network gives, with a floor under their spread.
 
     Stable-Baselines3's own mean has no bounds, and actions are cut to theirs afterwards. Where a
     full action is best, as to open a grip above a cube, the mean drifts far beyond it, and no draw
@@ -33,7 +33,8 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
         return {**super()._get_constructor_parameters(), "least_std": self.least_std}
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
-        mean = torch.tanh(self.action_net(latent_pi))
+        # softer than tanh, whose slope is gone where an action has long been full
+        mean = torch.nn.functional.softsign(self.action_net(latent_pi))
         log_std = torch.log(self.least_std + torch.exp(self.log_std))
         distribution: Distribution = self.action_dist.proba_distribution(mean, log_std)
         return distribution

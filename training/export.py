@@ -106,7 +106,7 @@ def policy_file_of(
         network=Network(
             widths=[layers[0][0].shape[1], *(len(biases) for _, biases in layers)],
             activation=activation,
-            squashing="tanh" if isinstance(model.policy, SACPolicy | BoundedPolicy) else "clip",
+            squashing=_squashing(model.policy),
             low=[float(x) for x in actions.low.flatten()],
             high=[float(x) for x in actions.high.flatten()],
         ),
@@ -118,6 +118,13 @@ def policy_file_of(
         versions=package_versions(),
     )
     return PolicyFile(header, mean, variance, layers)
+
+
+def _squashing(policy: Any) -> str:
+    """How the header names what becomes of the last layer's output."""
+    if isinstance(policy, BoundedPolicy):
+        return "softsign"
+    return "tanh" if isinstance(policy, SACPolicy) else "clip"
 
 
 def _layers(model: BaseAlgorithm) -> tuple[list[torch.nn.Linear], str]:

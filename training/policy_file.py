@@ -39,6 +39,10 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "relu": lambda x: np.maximum(x, 0.0),
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
 }
+SQUASHED: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "tanh": np.tanh,
+    "softsign": lambda x: x / (1.0 + np.abs(x)),
+}
 
 
 @dataclass(frozen=True)
@@ -88,8 +92,8 @@ class PolicyFile:
         for number, (weights, biases) in enumerate(self.layers):
             x = (activation(x) if number else x) @ weights.T.astype(np.float64) + biases
         low, high = np.array(header.network.low), np.array(header.network.high)
-        if header.network.squashing == "tanh":
-            x = low + 0.5 * (np.tanh(x) + 1.0) * (high - low)
+        if header.network.squashing in SQUASHED:
+            x = low + 0.5 * (SQUASHED[header.network.squashing](x) + 1.0) * (high - low)
         return np.clip(x, low, high).astype(np.float32)
 
     def to_bytes(self) -> bytes:

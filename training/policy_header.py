@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-SQUASHING = {"ppo": ("clip", "tanh"), "sac": ("tanh",)}
-"""By algorithm, how the network's output may become an action: cut to its bounds, or tanh."""
+SQUASHING = {"ppo": ("clip", "softsign"), "sac": ("tanh",)}
+"""By algorithm, how the network's output may become an action: cut to its bounds, or squashed."""
 ACTIVATION_NAMES = ("tanh", "relu", "elu")
 
 
@@ -36,7 +36,7 @@ class Network:
     activation: str
     """Between layers: tanh, relu or elu."""
     squashing: str
-    """Of the output: "clip" to the bounds, or "tanh" and stretched to the bounds."""
+    """Of the output: "clip" to the bounds, or "tanh" or "softsign" and stretched to the bounds."""
     low: list[float]
     """Lower bounds of the action."""
     high: list[float]

@@ -31,7 +31,7 @@ def test_the_mean_stays_within_bounds_and_the_spread_above_its_floor(model):
         model.policy.action_net.weight[:] = 0.0
         model.policy.log_std[:] = torch.tensor([0.0, -20.0])
     of = distribution(model).distribution
-    np.testing.assert_allclose(of.mean.detach()[0], np.tanh([5.0, -0.5]), rtol=1e-6)
+    np.testing.assert_allclose(of.mean.detach()[0], [5.0 / 6.0, -0.5 / 1.5], rtol=1e-6)
     np.testing.assert_allclose(of.stddev.detach()[0], [1.0 + LEAST, LEAST], rtol=1e-6)
 
 

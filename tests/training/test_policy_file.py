@@ -194,7 +194,7 @@ def test_a_header_that_was_made_up_is_refused_or_acts(kept, tmp_path, field, val
     [
         ({"algorithm": "td4"}, "algorithm is 'td4', should be ppo or sac"),
         ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
-        ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or tanh"),
+        ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         ({"network__widths": [6, 64, 32, 2]}, "bytes of numbers"),
         ({"network__widths": [7, 64, 64, 2]}, "begins with 7, should be 6"),
