@@ -21,6 +21,7 @@ from training.settings import (
     flag,
     integer,
     mapping,
+    named_calls,
     number,
     optional,
     schedule,
@@ -38,6 +39,15 @@ BESIDE = ("target_success_rate", "finish_timesteps", "finish_env_kwargs")
 """Settings of our own that may stand beside the environments, each keyed by their ids."""
 BOUNDED = "training.bounded.BoundedPolicy"
 """By where it is found, as the zoo asks for what is not Stable-Baselines3's."""
+WRAPPERS = (
+    "rigid_envs.wrappers.ActionPenalty",
+    "rigid_envs.wrappers.ClipReward",
+    "rigid_envs.wrappers.ScaleReward",
+    "rigid_envs.wrappers.SmoothnessPenalty",
+    "rigid_envs.wrappers.SuccessBonus",
+    "rigid_envs.wrappers.TimePenalty",
+)
+"""By where they are found: those of which YAML can hold the arguments."""
 NETWORK = {
     "net_arch": widths,
     "activation": choice("tanh", "relu", "elu"),
@@ -65,6 +75,9 @@ class TrainConfig:
     """Environment steps to train for, summed over worlds."""
     env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments of the environment: reward_type, fidelity, ..."""
+    env_wrapper: Any = setting(optional(named_calls(*WRAPPERS)), None)
+    """Reward wrappers of training: NAME, {NAME: {argument: value}} or a list, the innermost first;
+    their vector versions are taken. Success is what it is without."""
     finish_timesteps: int = setting(integer(0), 0)
     """Of these steps so many, the last, are trained with `finish_env_kwargs` too, at least."""
     finish_env_kwargs: dict[str, Any] = setting(mapping(), {})
@@ -282,9 +295,7 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     for key, values in beside.items():
         if env_id in values:
             if key in settings:
-                raise UsageError(
-                    f"{source}: {env_id}: {key} is given twice, should be given once"
-                )
+                raise UsageError(f"{source}: {env_id}: {key} is given twice, should be given once")
             settings = {**settings, key: values[env_id]}
     return ALGORITHMS[algo].from_mapping(env_id, settings, source)
 

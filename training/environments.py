@@ -7,7 +7,10 @@ import gymnasium as gym
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rigid_envs  # noqa: F401  (registers the ids)
+from rigid_envs.wrappers import vector
+from training.config import TrainConfig
 from training.errors import UsageError, nearest
+from training.settings import calls_of
 
 Made = TypeVar("Made")
 
@@ -29,6 +32,22 @@ def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorE
             **env_kwargs,
         ),
     )
+
+
+def make_training_env(config: TrainConfig, env_kwargs: dict[str, Any]) -> VectorEnv:
+    """The vector environment in the configured reward wrappers.
+
+    Raises:
+        UsageError: As `make_vector_env`; a wrapper refuses its arguments.
+    """
+    envs = make_vector_env(config.env_id, config.n_envs, **env_kwargs)
+    for name, arguments in calls_of(config.env_wrapper):
+        try:
+            envs = getattr(vector, name.rpartition(".")[2])(envs, **arguments)
+        except (TypeError, ValueError) as error:
+            envs.close()
+            raise UsageError(f"env_wrapper {name} refuses {arguments}: {error}") from error
+    return envs
 
 
 def make_single_env(env_id: str, /, **env_kwargs: Any) -> gym.Env:

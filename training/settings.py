@@ -147,6 +147,30 @@ def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
     return read
 
 
+def named_calls(*names: str) -> Rule:
+    """A name, {name: {argument: value}} or a list of either, as the zoo writes wrappers."""
+
+    def read(value: Any) -> Any:
+        for entry in value if isinstance(value, list) else [value]:
+            one = {entry: {}} if isinstance(entry, str) else entry
+            if not isinstance(one, dict) or len(one) != 1:
+                raise Unfit("NAME, {NAME: {argument: value}} or a list of either")
+            for name, arguments in one.items():
+                choice(*names)(name)
+                _nested(name, mapping(), arguments)
+        return value
+
+    return read
+
+
+def calls_of(value: Any) -> list[tuple[str, dict[str, Any]]]:
+    """Names and arguments of what `named_calls` accepts, in order; none of None."""
+    if value is None:
+        return []
+    entries = value if isinstance(value, list) else [value]
+    return [(one, {}) if isinstance(one, str) else next(iter(one.items())) for one in entries]
+
+
 def _nested(key: str, rule: Rule, value: Any) -> Any:
     try:
         return rule(value)

@@ -24,7 +24,7 @@ from training.bootstrap import BatchedTimeoutBootstrap
 from training.bounded import BoundedPolicy
 from training.checkpoint import PeriodicCheckpoint, save_checkpoint
 from training.config import BOUNDED, PPOConfig, SACConfig, TrainConfig
-from training.environments import make_vector_env
+from training.environments import make_training_env
 from training.errors import UsageError
 from training.export import policy_file_of
 from training.finish import FinishElsewhere
@@ -212,7 +212,7 @@ def _learn(
         assert config.seed is not None
         finish = FinishElsewhere(
             worlds,
-            partial(make_vector_env, config.env_id, config.n_envs, **config.last_env_kwargs),
+            partial(make_training_env, config, config.last_env_kwargs),
             config.n_timesteps - config.finish_timesteps,
             config.seed + config.n_envs,
         )
@@ -251,7 +251,7 @@ def _check_finish(config: TrainConfig, worlds: RigidVecEnv) -> None:
     """Raises UsageError now where the environment would refuse the last part of the run."""
     if not config.finish_timesteps:
         return
-    envs = make_vector_env(config.env_id, config.n_envs, **config.last_env_kwargs)
+    envs = make_training_env(config, config.last_env_kwargs)
     try:
         worlds.check_like(envs)
     except ValueError as error:
@@ -275,7 +275,7 @@ def _worlds_and_model(
 ) -> Iterator[tuple[RigidVecEnv, BaseAlgorithm]]:
     threads = torch.get_num_threads()
     torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
-    worlds = RigidVecEnv(make_vector_env(config.env_id, config.n_envs, **config.env_kwargs))
+    worlds = RigidVecEnv(make_training_env(config, config.env_kwargs))
     try:
         yield worlds, _build(config, _wrapped(worlds, config), _checked(device))
     finally:

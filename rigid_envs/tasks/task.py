@@ -44,6 +44,7 @@ class Task(ABC):
 
     @property
     def guides(self) -> tuple[tuple[str, str, float, float], ...]:
+        """Name, unit, low and high of every component that `guide` writes."""
         return tuple((f"{name} to go", unit, a - b, b - a) for name, unit, a, b in self.goal_bounds)
 
     @abstractmethod

@@ -15,10 +15,10 @@ FINER = {"fidelity": "accurate"}
 def made(monkeypatch):
     """Fidelities of the worlds that were stepped, one for each step."""
     stepped = []
-    original = train_module.make_vector_env
+    original = train_module.make_training_env
 
-    def make(env_id, num_envs, /, **env_kwargs):
-        envs = original(env_id, num_envs, **env_kwargs)
+    def make(config, env_kwargs):
+        envs = original(config, env_kwargs)
         step = envs.step
 
         def noted(actions):
@@ -28,7 +28,7 @@ def made(monkeypatch):
         envs.step = noted
         return envs
 
-    monkeypatch.setattr(train_module, "make_vector_env", make)
+    monkeypatch.setattr(train_module, "make_training_env", make)
     return stepped
 
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.training.reach import ReachVectorEnv
 from training import cli
-from training.config import BOUNDED, ALGORITHMS, load_config, packaged_environments
+from training.config import ALGORITHMS, BOUNDED, load_config, packaged_environments
 from training.errors import UsageError
 from training.evaluate import evaluate
 from training.policy_file import load_policy_file, read_policy

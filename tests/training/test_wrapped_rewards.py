@@ -1,8 +1,11 @@
 """Learners see the rewards of wrapped environments, relabelled ones too."""
 
+import re
+
 import gymnasium as gym
 import numpy as np
 import pytest
+import yaml
 from stable_baselines3 import SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
@@ -11,7 +14,9 @@ from stable_baselines3.her import HerReplayBuffer
 
 from rigid_envs import wrappers
 from rigid_envs.wrappers import Stage, goal_potential
-from training.environments import make_vector_env
+from training.config import load_config
+from training.environments import make_training_env, make_vector_env
+from training.errors import UsageError
 from training.vec_env import RigidVecEnv
 
 PUSH = "RigidEnvs/Push-v0"
@@ -77,3 +82,51 @@ def test_hindsight_that_keeps_infos_relabels_costs_of_actions():
 @pytest.mark.parametrize("kind", ["sparse", "dense"])
 def test_stable_baselines3s_checker_finds_nothing(name, arguments, kind):
     check_env(getattr(wrappers, name)(gym.make(PUSH, reward_type=kind), **arguments))
+
+
+PENALTY = "rigid_envs.wrappers.ActionPenalty"
+BONUS = "rigid_envs.wrappers.SuccessBonus"
+
+
+@pytest.mark.parametrize(
+    ("entry", "paid"),
+    [
+        (None, 0.0),
+        ({PENALTY: {"weight": 0.5}}, -1.5),
+        ([{PENALTY: {"weight": 0.5}}, {BONUS: {"bonus": 2.0}}, {PENALTY: {"weight": 1}}], -4.5),
+    ],
+)
+def test_configured_wrappers_are_those_of_vectors(write_yaml, entry, paid):
+    settings = {"n_timesteps": 100, "n_envs": 3, "env_wrapper": entry}
+    path = write_yaml(yaml.safe_dump({PUSH: settings}))
+    config = load_config("ppo", PUSH, path)
+    plain, wrapped = make_vector_env(PUSH, 3), make_training_env(config, {})
+    actions = np.ones((3, 3), dtype=np.float32)
+    rewards = []
+    for envs in (plain, wrapped):
+        envs.reset(seed=0)
+        rewards.append(envs.step(actions)[1])
+    np.testing.assert_allclose(rewards[1] - rewards[0], paid, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("entry", "complaint"),
+    [
+        ("rigid_envs.wrappers.ActionPenalti", "did you mean 'rigid_envs.wrappers.ActionPenalty'"),
+        ("rigid_envs.wrappers.PotentialShaping", "should be one of"),
+        ({PENALTY: 0.5}, "a mapping, as in"),
+        ({PENALTY: {}, BONUS: {}}, "should be NAME, "),
+        (3, "should be NAME, "),
+    ],
+)
+def test_other_wrappers_are_named(write_yaml, entry, complaint):
+    path = write_yaml(yaml.safe_dump({PUSH: {"n_timesteps": 100, "env_wrapper": entry}}))
+    with pytest.raises(UsageError, match=re.escape(complaint)):
+        load_config("ppo", PUSH, path)
+
+
+def test_what_a_wrapper_refuses_is_named(write_yaml):
+    entry = {PENALTY: {"weight": -1.0}}
+    path = write_yaml(yaml.safe_dump({PUSH: {"n_timesteps": 100, "env_wrapper": entry}}))
+    with pytest.raises(UsageError, match=r"env_wrapper .*ActionPenalty refuses .*weight"):
+        make_training_env(load_config("ppo", PUSH, path), {})

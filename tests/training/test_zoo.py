@@ -28,7 +28,8 @@ algo, config, log_folder, *env_ids = sys.argv[1:]
 found = {}
 for env_id in env_ids:
     manager = ExperimentManager(Namespace(), algo, env_id, log_folder, config=config, verbose=0)
-    settings = manager._preprocess_hyperparams(manager.read_hyperparameters()[0])[0]
+    read = manager.read_hyperparameters()[0]
+    settings, manager.env_wrapper, *_ = manager._preprocess_hyperparams(read)
     envs = manager.create_envs(1, no_log=True)
     model = ALGOS[algo](env=envs, seed=0, device="cpu", **deepcopy(settings))
     settings = {
@@ -42,6 +43,7 @@ for env_id in env_ids:
     settings |= {"n_envs": manager.n_envs, "n_timesteps": manager.n_timesteps}
     settings |= {"env_kwargs": manager.env_kwargs, "normalize": bool(manager.normalize)}
     found[env_id] = {"settings": settings, "gamma": model.gamma, "net_arch": model.policy.net_arch}
+    found[env_id]["env_wrapper"] = manager.env_wrapper is not None
 print()
 print(json.dumps(found))
 """
@@ -72,6 +74,8 @@ def test_the_zoo_reads_what_we_read_and_makes_a_model_of_it(algo, tmp_path):
         assert theirs == {name: ours[name] for name in theirs}
         # all that decides a run: what is left out is what is by default
         written = yaml.safe_load((PACKAGED / f"{algo}.yaml").read_text())[env_id]
-        assert set(theirs) == set(written) | {"normalize"}
+        assert set(theirs) == (set(written) | {"normalize"}) - {"env_wrapper"}
+        wrapper = ours["env_wrapper"]
+        assert found["env_wrapper"] == (wrapper is not None)
         assert found["gamma"] == ours["gamma"]
         assert found["net_arch"] is not None
