@@ -26,7 +26,7 @@ NEAR = 0.15  # m of way, in which the shaped terms fall to 1/e
 # cube beside its end; and how many times a way up counts: what stays low runs into cubes
 OVER, DOWN, CLIMB = 0.05, 0.04, 3.0
 # of the terms of a cube, in what is done of its stage
-STAGE = {"reach": 0.25, "grasp": 0.15, "place": 0.4, "release": 0.2}
+STAGE = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
 PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
 
 
