@@ -19,7 +19,7 @@ from training.run_folder import folder_name
 from training.settings import Unfit, choice, integer, mapping, number, optional, setting
 
 RESULT = "result.json"
-USUAL = ("reward_type", "fidelity")
+USUAL = ("reward_type", "fidelity", "guided")
 """Arguments of the environment that don't make it another task."""
 
 
@@ -102,10 +102,11 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
 
     Args:
         env_id: Environment id.
-        arguments: Its arguments; those of USUAL are left away.
+        arguments: Its arguments; those of USUAL are left away, and what is false or 0: such
+            arguments ask for nothing.
     """
     words = [folder_name(env_id)]
-    for name in sorted(set(arguments) - set(USUAL)):
+    for name in sorted({name for name, value in arguments.items() if value} - set(USUAL)):
         value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
         words.append(f"{name}-{value.strip('-')}")
     return "-".join(words)

@@ -267,6 +267,10 @@ def test_names_of_tasks_are_names_of_folders():
     arguments = {"randomize": {"size": [0.8, 1.2]}, "fidelity": "fast", "block": "T"}
     name = task_name("RigidEnvs/Push-v0", arguments)
     assert name == "RigidEnvs-Push-v0-block-T-randomize-size-0.8-1.2"
+    # what is observed makes no other task, and 0 asks for nothing
+    arguments = {"guided": True, "begun": 0.0, "obstacles": 0}
+    assert task_name("RigidEnvs/Stack-v0", arguments) == "RigidEnvs-Stack-v0"
+    assert task_name("RigidEnvs/Stack-v0", {"begun": 0.5}) == "RigidEnvs-Stack-v0-begun-0.5"
 
 
 def test_the_command_is_the_shortest_that_trains_the_same():
