@@ -143,8 +143,9 @@ def test_the_header_says_what_was_trained(kept):
 def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
     for algo, kind in ALGORITHMS.items():
         for env_id in packaged_environments(algo):
-            network = load_config(algo, env_id).policy_kwargs
-            short = {"n_timesteps": 16, "policy_kwargs": network, "normalize": True}
+            full = load_config(algo, env_id)
+            short = {"n_timesteps": 16, "normalize": True}
+            short |= {"policy": full.policy, "policy_kwargs": full.policy_kwargs}
             if algo == "ppo":
                 short |= {"n_steps": 16, "batch_size": 16}
             folder = train(kind.from_mapping(reach, short, "test"), tmp_path, quiet=True).folder
