@@ -2,9 +2,12 @@
 
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3.common.distributions import Distribution
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+
+from training.errors import UsageError
 
 
 class BoundedPolicy(MultiInputActorCriticPolicy):
@@ -19,6 +22,9 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
         *args: As of Stable-Baselines3's policy.
         least_std: Standard deviation that is added to the learned one.
         **kwargs: As of Stable-Baselines3's policy.
+
+    Raises:
+        UsageError: The action's bounds are not ±1.
     """
 
     action_net: torch.nn.Linear
@@ -28,6 +34,9 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     def __init__(self, *args: Any, least_std: float = 0.0, **kwargs: Any):
         self.least_std = least_std
         super().__init__(*args, **kwargs)
+        low, high = getattr(self.action_space, "low", 0.0), getattr(self.action_space, "high", 0.0)
+        if not (np.all(low == -1.0) and np.all(high == 1.0)):
+            raise UsageError(f"BoundedPolicy takes actions within ±1, not {self.action_space}")
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), "least_std": self.least_std}

@@ -16,6 +16,7 @@ import yaml
 from training.errors import UsageError, nearest
 from training.settings import (
     Unfit,
+    calls_of,
     choice,
     entropy_coefficient,
     flag,
@@ -48,6 +49,8 @@ WRAPPERS = (
     "rigid_envs.wrappers.TimePenalty",
 )
 """By where they are found: those of which YAML can hold the arguments."""
+OF_ACTIONS = ("rigid_envs.wrappers.ActionPenalty", "rigid_envs.wrappers.SmoothnessPenalty")
+"""Wrappers whose reward doesn't follow from goals: hindsight can't ask them."""
 NETWORK = {
     "net_arch": widths,
     "activation": choice("tanh", "relu", "elu"),
@@ -248,6 +251,12 @@ class SACConfig(TrainConfig):
                 f"{source}: {self.env_id}: env_kwargs has guided: true, should be without: "
                 "what guides is told of the goal that was, and HerReplayBuffer puts others in place"
             )
+        for name, _ in calls_of(self.env_wrapper):
+            if self.replay_buffer_class is not None and name in OF_ACTIONS:
+                raise UsageError(
+                    f"{source}: {self.env_id}: env_wrapper has {name}, should be without: "
+                    "HerReplayBuffer asks for rewards of goals alone"
+                )
 
 
 ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}

@@ -1,5 +1,6 @@
 """Actions of a bounded policy stay where they can be learned from."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
@@ -53,3 +54,10 @@ def test_a_run_keeps_bounded_policies_and_others_have_no_floor(quick_ppo, tmp_pa
     assert folder.config() == config
     with pytest.raises(UsageError, match=r"has least_std, should go with policy: .*Bounded"):
         quick_ppo.replace(policy_kwargs={"least_std": LEAST})
+
+
+def test_other_bounds_of_actions_are_refused():
+    env = RigidVecEnv(ReachVectorEnv(4))
+    env.action_space = gym.spaces.Box(np.float32([-1.0, -0.5]), np.float32([1.0, 1.0]))
+    with pytest.raises(UsageError, match="takes actions within ±1, not"):
+        PPO(BoundedPolicy, env)

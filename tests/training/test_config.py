@@ -166,6 +166,15 @@ def test_hindsight_and_guides_are_refused_together(write_yaml):
     assert load(write_yaml, text.replace("guided: true", "guided: false"), "sac")
 
 
+@pytest.mark.parametrize("name", ["ActionPenalty", "SmoothnessPenalty"])
+def test_hindsight_and_penalties_on_actions_are_refused_together(write_yaml, name):
+    wrapper = f"{{rigid_envs.wrappers.{name}: {{weight: 0.1}}}}"
+    text = f"{{n_timesteps: 100, env_wrapper: {wrapper}, replay_buffer_class: HerReplayBuffer}}"
+    with pytest.raises(UsageError, match=rf"env_wrapper has .*{name}, should be without"):
+        load(write_yaml, text, "sac")
+    assert load(write_yaml, text.replace("HerReplayBuffer", "null"), "sac")
+
+
 def test_unknown_algorithm_and_environment_name_the_nearest():
     with pytest.raises(UsageError, match=r"'pp0'; did you mean 'ppo'\?"):
         load_config("pp0", ENV)
