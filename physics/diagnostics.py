@@ -235,7 +235,7 @@ def samples(model: Model, solid: int) -> tuple[Array, float | Array]:
             continue
         # the same points meet every other solid, and every part of it
         rows = rows[(rows[other] == rows[other][0]) & (rows["frame"] == rows["frame"][0])]
-        points = [model.sample[row[first] : row[first] + row[count], :3] for row in rows]
+        points = [model.sample[:3, row[first] : row[first] + row[count]].T for row in rows]
         radii = rows["owner_radius"] if at == "owner" else rows["radius"] - rows["owner_radius"]
         if len(rows) == 1:
             return points[0].copy(), float(radii[0])

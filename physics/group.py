@@ -146,6 +146,7 @@ class Work(NamedTuple):
         side: [sides] of MEETING.
         lane: [1] of LANE.
         old: [longest list of candidates] of REMEMBERED.
+        gap: [most samples of a side] m, of one while it is searched.
         tensor: [solids] of TENSOR, inverse inertia in the world frame; of the impulse law.
         point: [slots] of POINT, likewise.
         near: [two longest lists] of NEAR, likewise.
@@ -156,6 +157,7 @@ class Work(NamedTuple):
     side: Array
     lane: Array
     old: Array
+    gap: Array
     tensor: Array
     point: Array
     near: Array
@@ -172,6 +174,7 @@ class Work(NamedTuple):
             side=aligned_zeros(len(model.side), MEETING),
             lane=aligned_zeros(1, LANE),
             old=np.zeros(longest, REMEMBERED),
+            gap=np.zeros(int(model.side["sample_count"].max(initial=0))),
             tensor=aligned_zeros(solids if features.impulse else 0, TENSOR),
             point=aligned_zeros(slots if features.impulse else 0, POINT),
             near=np.zeros(2 * longest if features.impulse else 0, NEAR),

@@ -52,6 +52,7 @@ SIDE = np.dtype(
         ("next", "i8"),  # the next side of the same pair, after the last the first
         ("first_sample", "i8"),  # into Model.sample
         ("sample_count", "i8"),
+        ("extent", "f8", (3,)),  # m at size 1, of the samples along the axes of the owner's frame
         ("first_partner", "i8"),  # likewise, the particles of a particle surface
         ("partner_count", "i8"),
         ("first_slot", "i8"),  # room for candidates
@@ -149,7 +150,7 @@ class Model(NamedTuple):
         part: [q] of PART; of varied worlds [groups, q], with a value a lane of PART_VARIES.
         cover: [c] of COVER.
         static: [s, 7] position m and quaternion x y z w of the statics.
-        sample: [p, 4] x y z in m in the owner's frame at size 1, and weight.
+        sample: [4, p] x y z in m in the owner's frame at size 1, and weight.
     """
 
     mover: Array
@@ -314,6 +315,7 @@ def _side_rows(layout: Layout) -> tuple[Array, Array]:
         row["owner"], row["surface"], row["kind"] = side.owner, side.other, side.surface.kind
         row["frame"] = side.other if side.part < 0 else len(layout.solids) + side.part
         row["first_sample"], row["sample_count"] = add(side.samples)
+        row["extent"] = np.abs(side.samples.positions).max(axis=0, initial=0.0)
         if side.partners is not None:
             row["first_partner"], row["partner_count"] = add(side.partners)
         row["first_slot"], row["slot_count"] = slots, side.capacity
@@ -323,7 +325,7 @@ def _side_rows(layout: Layout) -> tuple[Array, Array]:
             for name in ("rolling", "spinning"):
                 field = f"{name}_resistance"
                 row[name] = max(getattr(a.material, field), getattr(b.material, field))
-    return rows, np.concatenate(samples)
+    return rows, np.ascontiguousarray(np.concatenate(samples).T)
 
 
 def _features(scene: Scene, fidelity: Fidelity, model: Model, varied: bool) -> Features:

@@ -15,6 +15,7 @@ from functools import cache
 from physics.group import count_slots
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
+from physics.stages.gaps import gap_along_axes, make_measure
 from physics.stages.manifold import make_choose, note
 from physics.stages.relative import relative_pose
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
@@ -27,6 +28,7 @@ def make_search(features):
     impulse, resistance = features.impulse, features.resistance
     sphere, box, capsule = features.sphere, features.box, features.capsule
     particles, varied = features.particles, features.varied
+    measure = make_measure(features)
 
     @kernel
     def distance(side, i, x, y, z):
@@ -126,8 +128,15 @@ def make_search(features):
         n = 0
         cursor = 0
         nearest = 1e300
+        pairs = particles and side.partner_count > 0
+        if not pairs:
+            measure(model, side, i, seen, work.gap)
         for s in range(side.sample_count):
-            sample = model.sample[side.first_sample + s]
+            gap = 0.0 if pairs else work.gap[s]
+            if not pairs and not gap < reach:
+                nearest = min(nearest, gap)
+                continue
+            sample = model.sample[:, side.first_sample + s]
             sx, sy, sz, weight = sample[0], sample[1], sample[2], share * sample[3]
             if varied:
                 size = at(side.owner_size, i)
@@ -135,9 +144,9 @@ def make_search(features):
             x = R[0, i] * sx + R[1, i] * sy + R[2, i] * sz + c[0, i]
             y = R[3, i] * sx + R[4, i] * sy + R[5, i] * sz + c[1, i]
             z = R[6, i] * sx + R[7, i] * sy + R[8, i] * sz + c[2, i] - height
-            if particles and side.partner_count > 0:
+            if pairs:
                 for j in range(side.partner_count):
-                    p = model.sample[side.first_partner + j]
+                    p = model.sample[:, side.first_partner + j]
                     px, py, pz = p[0], p[1], p[2]
                     if varied:
                         size = at(side.surface_size, i)
@@ -158,27 +167,23 @@ def make_search(features):
                     elif gap < nearest:
                         nearest = gap
             else:
-                gap, nx, ny, nz = distance(side, i, x, y, z)
-                gap -= radius
-                if gap < reach:
-                    if impulse:
-                        note(
-                            work.near[near + n],
-                            work.solid[side.frame],
-                            i,
-                            x,
-                            y,
-                            z + height,
-                            nx,
-                            ny,
-                            nz,
-                            gap,
-                        )
-                    cursor = keep(candidate[n], i, old, cursor, count, s, sx, sy, sz, weight)
-                    ids[n, i] = s
-                    n += 1
-                elif gap < nearest:
-                    nearest = gap
+                if impulse:
+                    _, nx, ny, nz = distance(side, i, x, y, z)
+                    note(
+                        work.near[near + n],
+                        work.solid[side.frame],
+                        i,
+                        x,
+                        y,
+                        z + height,
+                        nx,
+                        ny,
+                        nz,
+                        gap,
+                    )
+                cursor = keep(candidate[n], i, old, cursor, count, s, sx, sy, sz, weight)
+                ids[n, i] = s
+                n += 1
         return n, reach if n > 0 else nearest
 
     @kernel
@@ -196,6 +201,8 @@ def make_search(features):
         else:
             far = math.sqrt(c[0, i] * c[0, i] + c[1, i] * c[1, i] + c[2, i] * c[2, i])
             gap = far - at(side.owner_reach, i) - at(side.surface_reach, i)
+        if side.partner_count == 0:
+            gap = max(gap, gap_along_axes(side, i, seen))
         reach = at(side.skin, i)
         if impulse and side.partner_count == 0:
             # what is met by the middle of the next drift collides before it overlaps

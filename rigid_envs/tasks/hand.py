@@ -6,11 +6,11 @@ from the reference, of which the hand may be short by three quarters of a stride
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from physics import Box, Gripper, Material, Readout, World
+from physics import Box, Gripper, Material, Readout, Scene, World
 
 Array = np.ndarray
 Vector = tuple[float, float, float]
@@ -73,11 +73,35 @@ class Hand:
         hand, slack = self.place(now), 0.75 * self.stride
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
-        half = 0.25 * self.widest * (actions[:, 3] + 1.0) + self.PAD
-        fingers = np.stack([target, target], axis=1)
+        opening = 0.5 * self.widest * (actions[:, 3] + 1.0)
+        world.move_drives(self.fingers(target, opening), frame)
+
+    def fingers(self, place: Array, opening: Any = None) -> Array:
+        """Both pads [count, 2, 3] m of a hand at a place [count, 3] m, wide open if not told."""
+        half = 0.5 * (self.widest if opening is None else opening) + self.PAD
+        fingers = np.stack([place, place], axis=1)
         fingers[:, 0, 1] -= half
         fingers[:, 1, 1] += half
-        world.move_drives(fingers, frame)
+        return fingers
+
+    def hold(self, scene: Scene, like: World, frame: float) -> tuple[Array, Array]:
+        """Where pads [1, 2, 3] m and bodies [1, bodies, 3] m are once the grip has closed at home.
+
+        How deep the pads press in depends on the fidelity, but not on a body's size.
+
+        Args:
+            scene: a body between the pads.
+            like: a world of the fidelity.
+            frame: s of a step.
+        """
+        # its numbers are those of worlds that are alike; varied only to share compiled kernels
+        world = World(scene, like.fidelity, varied=like.features.varied)
+        closed = np.array(self.home) + np.zeros((2, 3))
+        world.move_drives(closed, frame)
+        for _ in range(10):
+            world.advance(frame)
+            world.move_drives(closed, frame)
+        return world.drive_position.copy(), world.position.copy()
 
     def place(self, now: Readout) -> Array:
         """The middle between the pads, [count, 3] m."""

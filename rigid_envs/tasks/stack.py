@@ -1,11 +1,12 @@
 """Stack: a gripper builds a tower of cubes at a goal."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from physics import Body, Box, Ground, Material, Readout, Scene, World
+from physics import Body, Box, Fidelity, Ground, Material, Readout, Scene, World
 from physics.validation import integer, number
 from rigid_envs.camera import Camera
 from rigid_envs.rewards import Reward, distance
@@ -27,6 +28,8 @@ NEAR = 0.15  # m of way, in which the shaped terms fall to 1/e
 OVER, DOWN, CLIMB = 0.05, 0.04, 3.0
 # of the terms of a cube, in what is done of its stage
 STAGE = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
+# m beside its place, at most, and half of the m above it, at which a cube held at the start is
+ABOVE = (0.05, 0.05, 0.04)
 PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
 
 
@@ -54,6 +57,9 @@ class Stack(Task):
         begun: share of episodes that start with a tower begun, of one cube or more, all but one at
             most, each number as often. An easier way in for training: where a tower of one is
             common, what comes after it is learned too.
+        at_hand: share of episodes that start with the next cube at hand: in half of them between
+            open fingers where it lies, in the others held by the closed ones above its place. A
+            learner that is told nothing but success meets it sooner.
     """
 
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
@@ -68,10 +74,11 @@ class Stack(Task):
         ("share placed", "", 0.0, 1.0),
     )
 
-    def __init__(self, blocks: int = 2, begun: float = 0.0) -> None:
+    def __init__(self, blocks: int = 2, begun: float = 0.0, at_hand: float = 0.0) -> None:
         """Lists what is observed of so many cubes."""
         self.blocks = integer("blocks", blocks, low=2)
         self.begun = number("begun", begun, low=0.0, high=1.0)
+        self.at_hand = number("at_hand", at_hand, low=0.0, high=1.0)
         if self.blocks > 5:
             raise ValueError(f"blocks must be at most 5, got {blocks!r}")
         self.actions = self.hand.actions
@@ -83,7 +90,9 @@ class Stack(Task):
             *((f"cube {i} {a}", "m", -1.0, 1.0) for i in range(self.blocks) for a in "xyz"),
             ("released", "m", 0.0, 1.0),
         )
-        self.draws = len(PLACES) + 2 * (self.blocks + 1) + (self.begun > 0.0)
+        # the last five are of easier starts
+        self.draws = len(PLACES) + 2 * (self.blocks + 1) + 5
+        self._held: dict[Fidelity, tuple[Array, Array]] = {}
         self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0}, hurry=-2.0)
 
     def scene(self) -> Scene:
@@ -119,13 +128,39 @@ class Stack(Task):
         tower = goals[:, :-1].reshape(count, n, 3)
         tower[:, :, :2] = places[:, n, None]
         tower[:, :, 2] = HALF * (2.0 * np.cumsum(size, axis=1) - size)
+        stand = np.zeros(count, dtype=int)
         if self.begun:
-            ahead = 1.0 - draws[:, -1] / self.begun  # above 0 in the share, evenly up to 1
-            stand = np.arange(n) < np.ceil(ahead * (n - 1))[:, None]
-            position = np.where(stand[:, :, None], tower, position)
+            ahead = 1.0 - draws[:, -5] / self.begun  # above 0 in the share, evenly up to 1
+            stand = np.maximum(np.ceil(ahead * (n - 1)), 0.0).astype(int)
+            position = np.where((np.arange(n) < stand[:, None])[:, :, None], tower, position)
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
+        near = draws[:, -4] < self.at_hand
+        if near.any():
+            worlds = np.zeros(len(mask), dtype=bool)
+            worlds[np.flatnonzero(mask)[near]] = True
+            cubes, of = position[near], (np.arange(near.sum()), stand[near])
+            fingers = self.hand.fingers(np.maximum(cubes[of], self.hand.low))
+            held = draws[near, -4] < 0.5 * self.at_hand
+            above = tower[near][of] + np.array(ABOVE) * (2.0 * draws[near, -3:] - (1.0, 1.0, 0.0))
+            above = np.maximum(above, self.hand.low)
+            pads, cube = self._holding(world)
+            pads = above[:, None] + pads - self.hand.home
+            pads[:, :, 1] += HALF * (size[near][of] - 1.0)[:, None] * (-1.0, 1.0)
+            cubes[of] = np.where(held[:, None], above + cube[0] - self.hand.home, cubes[of])
+            fingers = np.where(held[:, None, None], pads, fingers)
+            world.set_state(position=cubes, drive_position=fingers, worlds=worlds)
         return goals
+
+    def _holding(self, world: World) -> tuple[Array, Array]:
+        """See `Hand.hold`, of a cube."""
+        if world.fidelity not in self._held:
+            scene = self.scene()
+            cube = replace(scene.bodies[0], position=self.hand.home)
+            hand = self.hand.gripper(2.0 * HALF, scene.drives[0].material)
+            alone = replace(scene, bodies=(cube,), drives=(hand,))
+            self._held[world.fidelity] = self.hand.hold(alone, world, self.frame)
+        return self._held[world.fidelity]
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis, and its fingers."""

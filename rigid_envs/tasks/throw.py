@@ -59,11 +59,11 @@ class Throw(Task):
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """The hand at home, the ball in it; the target in a sector of a ring, by even area.
 
-        How deep the pads press into a ball doesn't depend on its size, so that fingers about
-        another one are only farther apart, and no world needs to settle for itself.
+        Fingers about a ball of another size are only farther apart, so no world needs to settle for
+        itself.
         """
         if world.fidelity not in self._held:
-            self._held[world.fidelity] = self._hold(world)
+            self._held[world.fidelity] = self.hand.hold(self.scene(), world, self.frame)
         fingers, ball = self._held[world.fidelity]
         size = world.parameters.size[mask, BALL] if world.features.varied else np.ones(len(draws))
         fingers = np.repeat(fingers, len(draws), axis=0)
@@ -73,17 +73,6 @@ class Throw(Task):
         square = NEAREST**2 + (FARTHEST**2 - NEAREST**2) * draws[:, 0]
         far, angle = np.sqrt(square), ASIDE * (2.0 * draws[:, 1] - 1.0)
         return np.stack([far * np.cos(angle), far * np.sin(angle), RADIUS * size], 1)
-
-    def _hold(self, like: World) -> tuple[Array, Array]:
-        """Where fingers and ball are once the grip has closed: how deep depends on the fidelity."""
-        # its numbers are those of worlds that are alike; varied only to share compiled kernels
-        world = World(self.scene(), like.fidelity, varied=like.features.varied)
-        closed = np.array(self.hand.home) + np.zeros((2, 3))
-        world.move_drives(closed, self.frame)
-        for _ in range(10):
-            world.advance(self.frame)
-            world.move_drives(closed, self.frame)
-        return world.drive_position.copy(), world.position.copy()
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 12 cm along each axis, and its fingers."""

@@ -126,7 +126,9 @@ def test_only_one_file_names_the_options_of_numba():
 
 
 @pytest.mark.parametrize("varied", [False, True])
-def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path, varied):
+def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path, varied, stress):
+    if varied and not stress:
+        pytest.skip("half a minute in plain Python; see make stress")
     script = PUSH.format(varied=varied)
     plain = run(script, tmp_path, NUMBA_DISABLE_JIT="1")
     compiled = run(script, os.environ.get("NUMBA_CACHE_DIR", tmp_path))

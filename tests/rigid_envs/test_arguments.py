@@ -45,7 +45,11 @@ def test_what_only_single_environments_take_is_refused_for_vectors(name):
     [
         (PUSH, "rewardtype", "did you mean 'reward_type'?"),
         (PUSH, "obstacle", "did you mean 'obstacles'?"),
-        (STACK, "bloks", "of its own, Stack has ['blocks', 'begun']; did you mean 'blocks'?"),
+        (
+            STACK,
+            "bloks",
+            "of its own, Stack has ['blocks', 'begun', 'at_hand']; did you mean 'blocks'?",
+        ),
         (PUSH, "blocks", "of its own, Push has ['target_yaw', 'obstacles', 'block']"),
         (PUSH, "count", "unknown argument 'count'"),  # which the runner inside has
     ],

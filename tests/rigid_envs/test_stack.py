@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_envs.rewards import distance
-from rigid_envs.tasks.stack import CELL, HALF, JITTER, THRESHOLD, Stack, _way
+from rigid_envs.tasks.stack import ABOVE, CELL, HALF, JITTER, THRESHOLD, Stack, _way
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
 
@@ -59,11 +59,43 @@ def test_a_share_of_episodes_starts_with_a_tower_begun(blocks, begun):
         np.testing.assert_array_equal(values[same], observation[key][same])
 
 
-def test_a_wrong_share_of_towers_begun_is_named():
-    with pytest.raises(ValueError, match=r"begun must be .* at most 1, got 1\.5"):
-        make(STACK, begun=1.5)
-    with pytest.raises(TypeError, match="begun"):
-        make(STACK, begun="often")
+@pytest.mark.parametrize("name", ["begun", "at_hand"])
+def test_a_wrong_share_of_easier_starts_is_named(name):
+    with pytest.raises(ValueError, match=rf"{name} must be .* at most 1, got 1\.5"):
+        make(STACK, **{name: 1.5})
+    with pytest.raises(TypeError, match=name):
+        make(STACK, **{name: "often"})
+
+
+@pytest.mark.parametrize("fidelity", PRESETS)
+@pytest.mark.parametrize("randomize", [None, {"size": (0.85, 1.25)}])
+def test_a_share_of_episodes_starts_with_the_next_cube_at_hand(fidelity, randomize):
+    count, share = 400, 0.8
+    kwargs = {"begun": 0.5, "fidelity": fidelity, "randomize": randomize}
+    plain, envs = (make_vec(count, STACK, at_hand=s, **kwargs) for s in (0.0, share))
+    before, (observation, info) = plain.reset(seed=0)[0], envs.reset(seed=0)
+    assert not info["is_success"].any()
+    stand, each = info["placed"].astype(int), np.arange(count)
+    cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))
+    cube, place = cubes[each, stand], tower[each, stand]
+    hand, opening = observation["observation"][:, :3], observation["observation"][:, 6]
+    moved = np.abs(cube - cubes_of(before["achieved_goal"])[each, stand]).max(axis=1) > 1e-6
+    about = ~moved & (np.abs(hand - cube)[:, :2].max(axis=1) < 1e-6)
+    np.testing.assert_allclose([moved.mean(), about.mean()], 0.5 * share, atol=0.08)
+    rest = ~moved & ~about
+    for key, values in before.items():
+        np.testing.assert_array_equal(values[rest], observation[key][rest])
+    np.testing.assert_allclose(opening[about], Stack.hand.widest, atol=1e-6)
+    way = cube - place
+    assert np.abs(way[moved, :2]).max() <= ABOVE[0] + 1e-3
+    assert way[moved, 2].min() > -0.005
+    assert way[moved, 2].max() <= 2.0 * ABOVE[2] + 1e-3
+
+    grip = np.tile(np.array([0.0, 0.0, 0.0, -1.0], dtype=np.float32), (count, 1))
+    for _ in range(10):
+        info = envs.step(grip)[4]
+    assert (info["grasp"] >= 1.0)[moved].all()  # nothing slips
+    assert (info["grasp"] >= 1.0)[about].all()  # all fingers had to do is close
 
 
 def test_a_way_leads_up_across_and_down():
