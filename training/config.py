@@ -39,7 +39,8 @@ without code, and a `configs` folder of the user's own would come first.
 BESIDE = ("target_success_rate", "finish_timesteps", "finish_env_kwargs")
 """Settings of our own that may stand beside the environments, each keyed by their ids."""
 BOUNDED = "training.bounded.BoundedPolicy"
-"""By where it is found, as the zoo asks for what is not Stable-Baselines3's."""
+OFFSETS = "training.offsets.OffsetPolicy"
+"""By where they are found, as the zoo asks for what is not Stable-Baselines3's."""
 WRAPPERS = (
     "rigid_envs.wrappers.ActionPenalty",
     "rigid_envs.wrappers.ClipReward",
@@ -222,6 +223,9 @@ class SACConfig(TrainConfig):
 
     algo: ClassVar[str] = "sac"
 
+    policy: str = setting(choice("MultiInputPolicy", "MlpPolicy", OFFSETS), "MultiInputPolicy")
+    """Policy class; training.offsets.OffsetPolicy is one for goal environments that sees how far
+    the goal is."""
     buffer_size: int = setting(integer(1), 1_000_000)
     """Transitions that the replay buffer holds, summed over worlds."""
     learning_starts: int = setting(integer(0), 1000)

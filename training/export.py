@@ -17,6 +17,7 @@ from stable_baselines3.sac.policies import SACPolicy
 from training.bounded import BoundedPolicy
 from training.config import TrainConfig
 from training.errors import UsageError
+from training.offsets import GoalOffsets
 from training.policy_file import SUFFIX, PolicyFile, load_policy_file
 from training.policy_header import Environment, Header, Network, Normalization, Success
 from training.run_folder import RunFolder, git_commit, package_versions, written_whole
@@ -91,8 +92,7 @@ def policy_file_of(
     space, actions = model.observation_space, model.action_space
     if not isinstance(space, spaces.Dict) or not isinstance(actions, spaces.Box):
         raise UsageError(f"policy files hold observations by key and real actions, not {space}")
-    linear, activation = _layers(model)
-    layers = [(_numbers(one.weight), _numbers(one.bias)) for one in linear]
+    layers, activation = _layers(model)
     env_id = config.env_id.rpartition(":")[2]  # before it stands the module that registers it
     version = re.search(r"-v(\d+)$", env_id)
     if version is None:
@@ -127,8 +127,8 @@ def _squashing(policy: Any) -> str:
     return "tanh" if isinstance(policy, SACPolicy) else "clip"
 
 
-def _layers(model: BaseAlgorithm) -> tuple[list[torch.nn.Linear], str]:
-    """The actor's linear layers in order, and the name of what stands between them."""
+def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], str]:
+    """The actor's weights and biases layer by layer, and the name of what stands between them."""
     policy: Any = model.policy
     if isinstance(model, PPO):
         extractor = policy.pi_features_extractor
@@ -140,12 +140,16 @@ def _layers(model: BaseAlgorithm) -> tuple[list[torch.nn.Linear], str]:
         raise UsageError(f"policy files hold PPO and SAC, not {type(model).__name__}")
     between = [module for module in modules if not isinstance(module, torch.nn.Linear)]
     kinds = {type(module) for module in between}
-    flat = all(isinstance(one, torch.nn.Flatten) for one in extractor.extractors.values())
+    offsets = isinstance(extractor, GoalOffsets)
+    flat = offsets or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
     alternate = len(modules) == 2 * len(between) + 1
     if not flat or not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
         raise UsageError(f"policy files hold layers with tanh, relu or elu, not {modules}")
     linear = [module for module in modules if isinstance(module, torch.nn.Linear)]
-    return linear, ACTIVATIONS[kinds.pop()] if kinds else "tanh"
+    layers = [(_numbers(one.weight), _numbers(one.bias)) for one in linear]
+    if offsets:  # linear too, so both make one layer
+        layers[0] = (_numbers(linear[0].weight.double() @ extractor.matrix.double()), layers[0][1])
+    return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh"
 
 
 def _statistics(env: VecNormalize | None) -> tuple[Normalization | None, Any, Any]:

@@ -12,24 +12,27 @@ from typing import Any
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from stable_baselines3.her import HerReplayBuffer
 
 from training.bootstrap import BatchedTimeoutBootstrap
 from training.bounded import BoundedPolicy
 from training.checkpoint import PeriodicCheckpoint, save_checkpoint
-from training.config import BOUNDED, PPOConfig, SACConfig, TrainConfig
+from training.config import BOUNDED, OFFSETS, PPOConfig, SACConfig, TrainConfig
 from training.environments import make_training_env
 from training.errors import UsageError
 from training.export import policy_file_of
 from training.finish import FinishElsewhere
 from training.learning_curve import continued_logger
 from training.model_state import read_state, restore
+from training.offsets import OffsetPolicy
 from training.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.rollout_threads import OneThreadRollouts
 from training.run_folder import RunFolder, create_run_folder
@@ -37,6 +40,7 @@ from training.vec_env import RigidVecEnv
 
 SUCCESS_WINDOW = 1000
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
+POLICIES: dict[str, type[BasePolicy]] = {BOUNDED: BoundedPolicy, OFFSETS: OffsetPolicy}
 ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
 
 
@@ -287,13 +291,19 @@ def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
     monitored = VecMonitor(worlds)
     if not config.normalize:
         return monitored
-    # a replay buffer's rewards would be scaled by what the statistics are when they are sampled
-    return VecNormalize(monitored, norm_reward=config.algo == "ppo", gamma=config.gamma)
+    if config.algo == "ppo":
+        return VecNormalize(monitored, gamma=config.gamma)
+    # a replay buffer's rewards would be scaled by what the statistics are when they are sampled,
+    # and of achieved and desired goals scaled apart the difference can't be told
+    goals = isinstance(monitored.observation_space, spaces.Dict)
+    return VecNormalize(
+        monitored, norm_reward=False, norm_obs_keys=["observation"] if goals else None
+    )
 
 
 def _build(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
     common: dict[str, Any] = {
-        "policy": BoundedPolicy if config.policy == BOUNDED else config.policy,
+        "policy": POLICIES.get(config.policy, config.policy),
         "env": env,
         "learning_rate": _schedule(config.learning_rate),
         "batch_size": config.batch_size,

@@ -1,0 +1,55 @@
+"""A policy of offsets sees how far the goal is, and its file acts as it does."""
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from stable_baselines3 import SAC
+
+from tests.training.reach import ReachVectorEnv
+from training.config import OFFSETS
+from training.errors import UsageError
+from training.offsets import SCALE, GoalOffsets, OffsetPolicy
+from training.policy_file import load_policy_file
+from training.train import train
+from training.vec_env import RigidVecEnv
+
+
+def test_features_are_the_observation_the_way_to_the_goal_and_the_goal():
+    env = RigidVecEnv(ReachVectorEnv(4))
+    found = env.reset()
+    features = GoalOffsets(env.observation_space)({k: torch.as_tensor(v) for k, v in found.items()})
+    way = SCALE * (found["desired_goal"] - found["achieved_goal"])
+    expected = np.concatenate([found["observation"], way, SCALE * found["desired_goal"]], axis=1)
+    np.testing.assert_allclose(features, expected, rtol=1e-5, atol=1e-6)
+    assert features.shape[1] == GoalOffsets(env.observation_space).features_dim
+
+
+def test_nothing_of_it_is_learned_and_a_saved_policy_keeps_it(tmp_path):
+    model = SAC(OffsetPolicy, RigidVecEnv(ReachVectorEnv(4)))
+    assert not list(model.actor.features_extractor.parameters())
+    model.save(tmp_path / "model.zip")
+    loaded = SAC.load(tmp_path / "model.zip")
+    assert isinstance(loaded.actor.features_extractor, GoalOffsets)
+    assert isinstance(loaded.critic.features_extractor, GoalOffsets)
+
+
+def test_the_file_of_a_trained_policy_acts_as_the_policy(quick_sac, tmp_path):
+    folder = train(quick_sac.replace(policy=OFFSETS), tmp_path, quiet=True).folder
+    content, model = load_policy_file(folder.policy), SAC.load(folder.model, custom_objects={
+        "replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1,
+    })  # fmt: skip
+    env = RigidVecEnv(ReachVectorEnv(50))
+    env.seed(3)
+    found = env.reset()
+    expected, _ = model.predict(found, deterministic=True)
+    np.testing.assert_allclose(content.act(found), expected, atol=2e-5)
+    assert content.header.network.widths[0] == sum(v.shape[1] for v in found.values())
+
+
+def test_it_is_for_goals_and_for_sac(quick_ppo):
+    box = spaces.Box(-1.0, 1.0, (3,))
+    with pytest.raises(UsageError, match="takes observations with goals, not Dict"):
+        GoalOffsets(spaces.Dict({"observation": box}))
+    with pytest.raises(UsageError, match=r"policy is 'training.offsets.OffsetPolicy', should be"):
+        quick_ppo.replace(policy=OFFSETS)
