@@ -13,13 +13,15 @@ the other lanes; NaN and infinity keep their meaning.
 """
 
 import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit, typeof
-from numba.core import config, types
+from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
 Array = np.ndarray
@@ -95,6 +97,26 @@ def entry(function: Any) -> Any:
 
     call.compiled = compiled  # type: ignore[attr-defined]
     return call
+
+
+class _Listener(event.Listener):
+    """Calls back when a kernel begins to be compiled; one from the disk needs none of it."""
+
+    def __init__(self, tell: Callable[[str], object]) -> None:
+        self.tell = tell
+
+    def on_start(self, event: Any) -> None:
+        self.tell(event.data["dispatcher"].py_func.__name__)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextmanager
+def telling(tell: Callable[[str], object]) -> Iterator[None]:
+    """Within it, `tell` is called with the name of each function that begins to be compiled."""
+    with event.install_listener("numba:compile", _Listener(tell)):
+        yield
 
 
 def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:

@@ -100,6 +100,8 @@ def array(field: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """`value` as a finite float array broadcast to `shape`."""
     try:
         result = np.asarray(value, dtype=float)
+        if result.ndim and result.size and 0 in shape[1:]:  # of nothing, numbers are too many
+            raise ValueError
         if result.shape != shape:
             result = np.broadcast_to(result, shape)
     except (TypeError, ValueError):

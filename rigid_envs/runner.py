@@ -118,7 +118,7 @@ class Runner:
 
         self._seeds = np.zeros(count, dtype=np.int64)
         self._episodes = np.full(count, -1, dtype=np.int64)
-        self._seeded = False
+        self._seeded = self._observed = False
         self._elapsed = np.zeros(count, dtype=np.int64)
         self._now = self.world.read()
         self._apart = np.zeros(count)
@@ -194,13 +194,20 @@ class Runner:
         told = split - len(self.task.guides) if self.guided else split
         table = columns((len(self._low),), self.count, np.float32)
         values = table.T[: self.count]
+        if not self._observed:
+            table[...] = np.nan
         self.task.observe(self.world, now, values[:, :seen])
+        if not self._observed:
+            self._check_written("observe", self.task.bounds, values[:, :seen])
         if self.observe_parameters:
             values[:, seen:told] = self.randomization.observed
         achieved, desired = values[:, split:], self._goals
         achieved[...] = self.task.achieved(self.world, now)
         if self.guided:
             self.task.guide(self.world, now, achieved, desired, values[:, told:split])
+            if not self._observed:
+                self._check_written("guide", self.task.guides, values[:, told:split])
+        self._observed = True
         outside = clip(table, self._low, self._high, self.count)
         self._apart = distance(achieved, desired)
         # as users expect them, a row for each world
@@ -219,6 +226,14 @@ class Runner:
         if self.reward_type == "dense" and self.reward.of_task:
             info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
         return observation, info
+
+    def _check_written(self, what: str, bounds: Any, values: Array) -> None:
+        """Raises ValueError where a task has left anything of an array [count, n] unwritten."""
+        names = [bound[0] for bound in bounds]
+        left = [name for name, gap in zip(names, np.isnan(values).any(axis=0), strict=True) if gap]
+        if left:
+            name = type(self.task).__name__
+            raise ValueError(f"{name}.{what} must write all of out, it has left {left}")
 
     def check_actions(self, actions: Any) -> Array:
         """Actions [count, actions] within [-1, 1].

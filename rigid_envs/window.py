@@ -13,6 +13,11 @@ Array = np.ndarray
 
 INK, PAPER = (52, 58, 66), (250, 251, 253)
 LINE_HEIGHT = 24  # pixels of a line of text
+NO_DISPLAY = 'no window can be opened: there is no display; render_mode="rgb_array" needs none'
+
+
+class NoDisplay(RuntimeError):
+    """A window was asked for where there is nothing to show it on."""
 
 
 class Key(NamedTuple):
@@ -78,6 +83,9 @@ class Window:
 
         Returns:
             The keys that went down or up since the last picture, in order.
+
+        Raises:
+            NoDisplay: there is none.
         """
         if self.closed:
             return []
@@ -102,7 +110,15 @@ class Window:
         self._surface, self.closed = None, True
 
     def _open(self) -> None:
-        self._pygame.display.init()
+        try:
+            self._pygame.display.init()
+        except self._pygame.error:
+            raise NoDisplay(NO_DISPLAY) from None
+        # without a display SDL draws to nowhere; whoever names such a driver wants it
+        driver = self._pygame.display.get_driver()
+        if "SDL_VIDEODRIVER" not in os.environ and driver in ("offscreen", "dummy"):
+            self._pygame.display.quit()
+            raise NoDisplay(NO_DISPLAY)
         room = LINE_HEIGHT * self.lines + (LINE_HEIGHT // 2 if self.lines else 0)
         self._surface = self._pygame.display.set_mode((self.width, self.height + room))
         self._pygame.display.set_caption(self.title)

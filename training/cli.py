@@ -7,7 +7,9 @@ installs what is missing. Flags follow rl-baselines3-zoo where it has a counterp
 import argparse
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         _require(*options.needs)
-        status: int = options.run(options)
+        with _telling_of_compilation() if options.simulates else nullcontext():
+            status: int = options.run(options)
     except UsageError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -206,10 +209,17 @@ def _results(options: argparse.Namespace) -> int:
 def _tune(options: argparse.Namespace) -> int:
     config = config_of(options)
 
+    from training.config import SACConfig
     from training.tuning import PART, tune
 
     # as many steps as were asked for, or a part of those that the settings have; none to finish on
     steps = config.n_timesteps if options.n_timesteps else max(1, config.n_timesteps // PART)
+    full = configured(options)
+    kept: dict[str, Any] = {}
+    if isinstance(full, SACConfig):  # the same share of the steps is blind
+        kept["learning_starts"] = full.learning_starts
+        blind = full.learning_starts * steps // full.n_timesteps
+        config = config.replace(learning_starts=blind)
     short = config.replace(n_timesteps=steps, finish_timesteps=0, finish_env_kwargs={})
     best = tune(
         short,
@@ -223,8 +233,8 @@ def _tune(options: argparse.Namespace) -> int:
     )
     if best.settings is not None:
         print(f"# {best.summary}")
-        full = configured(options)
         settings = best.settings.replace(
+            **kept,
             n_timesteps=full.n_timesteps,
             finish_timesteps=full.finish_timesteps,
             finish_env_kwargs=full.finish_env_kwargs,
@@ -256,8 +266,29 @@ def _require(extra: str, modules: Sequence[str]) -> None:
         )
 
 
+@contextmanager
+def _telling_of_compilation() -> Iterator[None]:
+    """Says on stderr what else would look like a command that hangs."""
+    from physics.jit import telling  # not for --help, which it would make wait
+
+    def tell(name: str) -> None:
+        if name == "advance":
+            print("compiling what this scene needs, once: 10 to 30 s", file=sys.stderr, flush=True)
+
+    with telling(tell):
+        yield
+
+
+def _version() -> str:
+    try:
+        return metadata.version("rigid-envs")
+    except metadata.PackageNotFoundError:
+        return "from a source tree that is not installed"
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="rigid-envs", description="Train and watch policies on rigid bodies.")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {_version()}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     def command(
@@ -265,9 +296,10 @@ def _parser() -> argparse.ArgumentParser:
         run: Any,
         summary: str,
         needs: tuple[str, Sequence[str]] = ("train", TRAIN_EXTRA),
+        simulates: bool = True,
     ) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=summary, description=summary)
-        added.set_defaults(run=run, needs=needs)
+        added.set_defaults(run=run, needs=needs, simulates=simulates)
         return added
 
     training = command("train", _train, "Train a policy into a run folder of its own.")
@@ -290,7 +322,8 @@ def _parser() -> argparse.ArgumentParser:
         "-o",
         "--output",
         type=Path,
-        help="mp4 or GIF to write, the latter small (default: video.mp4 in the run folder)",
+        help="mp4 or GIF to write, the latter small (default: video.mp4 in the run folder, or "
+        "named as the policy file, beside it)",
     )
 
     exporting = command("export", _export, "Copy the policy of a run into one small file.")
@@ -305,7 +338,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_play(playing)
 
-    plotting = command("plot", _plot, "Draw the learning curve of a run, or of several seeds.")
+    plotting = command(
+        "plot", _plot, "Draw the learning curve of a run, or of several seeds.", simulates=False
+    )
     add_plot(plotting)
 
     add_results(command("results", _results, "Record finished runs and write docs/results.md."))

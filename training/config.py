@@ -8,6 +8,7 @@ beside the environments instead of among their settings, keyed by environment id
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -93,8 +94,8 @@ class TrainConfig:
     run finishes on other arguments, begin with those early, and stop when it holds there too."""
     seed: int | None = setting(optional(integer(0)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
-    policy: str = setting(choice("MultiInputPolicy", "MlpPolicy"), "MultiInputPolicy")
-    """Policy class of Stable-Baselines3; goal environments need MultiInputPolicy."""
+    policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
+    """Policy class of Stable-Baselines3, for observations with goals."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation, which is by default
     Stable-Baselines3's: tanh for PPO, relu for SAC; least_std of BoundedPolicy."""
@@ -176,7 +177,7 @@ class PPOConfig(TrainConfig):
 
     algo: ClassVar[str] = "ppo"
 
-    policy: str = setting(choice("MultiInputPolicy", "MlpPolicy", BOUNDED), "MultiInputPolicy")
+    policy: str = setting(choice("MultiInputPolicy", BOUNDED), "MultiInputPolicy")
     """Policy class; training.bounded.BoundedPolicy is one for goal environments whose mean action
     stays within bounds."""
     n_steps: int = setting(integer(1), 2048)
@@ -223,7 +224,7 @@ class SACConfig(TrainConfig):
 
     algo: ClassVar[str] = "sac"
 
-    policy: str = setting(choice("MultiInputPolicy", "MlpPolicy", OFFSETS), "MultiInputPolicy")
+    policy: str = setting(choice("MultiInputPolicy", OFFSETS), "MultiInputPolicy")
     """Policy class; training.offsets.OffsetPolicy is one for goal environments that sees how far
     the goal is."""
     buffer_size: int = setting(integer(1), 1_000_000)
@@ -286,6 +287,13 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     entries = _read_yaml(path if path is not None else PACKAGED / f"{algo}.yaml", source)
     beside = {key: entries.pop(key, {}) for key in BESIDE}
     names = [str(key) for key in entries]
+    for name, value in entries.items():
+        alike = get_close_matches(str(name), BESIDE, 1)
+        if alike or not (isinstance(value, dict) or name == env_id):
+            raise UsageError(
+                f"{source}: {name!r} is neither an environment id nor one of {', '.join(BESIDE)}"
+                + (f"; did you mean {alike[0]!r}?" if alike else "")
+            )
     if not names:
         raise UsageError(f"{source}: should be a mapping from environment ids to settings")
     for key, values in beside.items():
@@ -300,7 +308,8 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     if env_id not in entries:
         raise UsageError(
             f"{source}: no settings for environment {env_id!r}; "
-            f"did you mean {nearest(env_id, names)!r}?"
+            f"did you mean {nearest(env_id, names)!r}? It has {', '.join(names)}; "
+            "settings of your own: --config FILE"
         )
     settings = entries[env_id]
     if not isinstance(settings, dict):

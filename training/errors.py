@@ -12,5 +12,7 @@ class UsageError(ValueError):
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """The valid name most like `word`, for "did you mean"."""
-    return difflib.get_close_matches(word, list(valid), n=1, cutoff=0.0)[0]
+    """The valid name most like `word`, in whatever case, for "did you mean"."""
+    names = list(valid)
+    lower = [name.lower() for name in names]
+    return names[lower.index(difflib.get_close_matches(word.lower(), lower, n=1, cutoff=0.0)[0])]

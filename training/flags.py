@@ -207,18 +207,19 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 def count(text: str) -> int:
     """Reads an integer of at least 1; 1e6 and 1_000_000 are fine."""
-    value = whole(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least 1")
-    return value
+    return _integer(text, 1)
 
 
 def whole(text: str) -> int:
     """Reads an integer of at least 0."""
+    return _integer(text, 0)
+
+
+def _integer(text: str, least: int) -> int:
     try:
         value = float(text)
-        if value >= 0 and value.is_integer():
+        if value >= least and value.is_integer():
             return int(value)
     except ValueError:
         pass
-    raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least 0")
+    raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least {least}")

@@ -1,6 +1,7 @@
 """The loggers of a run, which go on where a checkpoint stood."""
 
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,10 @@ class ContinuedTensorBoard(TensorBoardOutputFormat):
     """Writes a further file of events, which hides older ones from a step on."""
 
     def __init__(self, folder: Path, from_step: int):
+        # files are read in the order of their names, which begin with the second of their making
+        names = [path.name.split(".") for path in folder.glob("events.out.tfevents.*")]
+        while names and int(time.time()) <= max(int(name[3]) for name in names):
+            time.sleep(0.05)
         self.writer = SummaryWriter(log_dir=str(folder), purge_step=from_step)
         self._is_closed = False
 

@@ -118,7 +118,12 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
     model.set_parameters(tensors["parameters"], exact_match=True, device=model.device)
     for name in model._get_torch_save_params()[1]:
         getattr(model, name).data.copy_(tensors["variables"][name])
-    for name, one in _statistics(model.get_vec_normalize_env()).items():
+    statistics = _statistics(model.get_vec_normalize_env())
+    if tensors["statistics"].keys() != statistics.keys():
+        raise ValueError(
+            f"its statistics are of {sorted(tensors['statistics'])}, not {sorted(statistics)}"
+        )
+    for name, one in statistics.items():
         kept = tensors["statistics"][name]
         one.mean, one.var = kept["mean"].cpu().numpy(), kept["var"].cpu().numpy()
         one.count = float(kept["count"])

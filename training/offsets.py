@@ -11,7 +11,8 @@ from stable_baselines3.sac.policies import MultiInputPolicy
 from training.errors import UsageError
 
 SCALE = 10.0
-"""Of goals and ways to them, 1/m: those of a tabletop are tenths of a metre."""
+"""Of goals and ways to them: those of a tabletop are tenths of a metre. What a goal has beside
+places, as whether a cube is let go, weighs the more for it."""
 
 
 class GoalOffsets(BaseFeaturesExtractor):

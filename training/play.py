@@ -1,13 +1,12 @@
 """Play: a window in which the keyboard drives an environment's tool."""
 
-import os
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from typing import Any
 
 import numpy as np
 
-from rigid_envs.window import Key, Window, load_pygame
+from rigid_envs.window import Key, NoDisplay, Window, load_pygame
 from training.environments import make_single_env
 from training.errors import UsageError
 
@@ -148,11 +147,8 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
 def _show(window: Window, picture: Array, text: Sequence[str]) -> list[Key]:
     pygame = load_pygame()
     try:
-        keys = window.show(picture, text)
+        return window.show(picture, text)
+    except NoDisplay:
+        raise UsageError("no window can be opened: there is no display") from None
     except pygame.error as error:
         raise UsageError(f"no window can be opened: {error}") from None
-    # without a display SDL draws to nowhere and says nothing; whoever names such a driver wants it
-    asked_for = "SDL_VIDEODRIVER" in os.environ
-    if not (window.closed or asked_for) and pygame.display.get_driver() in ("offscreen", "dummy"):
-        raise UsageError("no window can be opened: there is no display")
-    return keys

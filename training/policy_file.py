@@ -74,6 +74,12 @@ class PolicyFile:
         """
         header = self.header
         given = {key: np.asarray(value).shape[1:] for key, value in observation.items()}
+        alone = {key: np.asarray(value).shape for key, value in observation.items()}
+        if alone == header.observation:
+            raise UsageError(
+                "the policy takes observations of many worlds, this is of one: give each an axis "
+                "in front, as in {key: value[None] for key, value in observation.items()}"
+            )
         if given != header.observation:
             raise UsageError(
                 f"the policy takes observations {header.observation}, "
@@ -159,7 +165,7 @@ def load_policy_file(path: Path) -> PolicyFile:
     return PolicyFile(header, mean, variance, layers)
 
 
-def read_policy(path: Path, *, algo: str | None = None, env_id: str | None = None) -> Policy:
+def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None = None) -> Policy:
     """The policy of a file, acting by its mean.
 
     Args:
@@ -171,6 +177,7 @@ def read_policy(path: Path, *, algo: str | None = None, env_id: str | None = Non
         UsageError: As `load_policy_file`, it is of another algorithm, or its environment is
             not the one that is installed.
     """
+    path = Path(path)
     content = load_policy_file(path)
     environment = content.header.environment
     if algo not in (None, content.header.algorithm):

@@ -129,16 +129,12 @@ def _check_place(
         if (other.algorithm, other.task) != (config.algo, task):
             continue
         place = other.folder(repository).relative_to(repository)
-        if other.seed == config.seed:
-            if replace:
-                continue
-            same = other.started == run.get("started") and other.arguments == config.last_env_kwargs
-            raise UsageError(
-                f"it is recorded already, in {place}"
-                if same
-                else f"{place} holds another run of its seed; to put this in its place: "
-                f"rigid-envs results --replace {folder.path}"
-            )
+        again = other.seed == config.seed
+        if again and replace:
+            continue
+        same = again and other.started == run.get("started")
+        if same and other.arguments == config.last_env_kwargs:
+            raise UsageError(f"it is recorded already, in {place}")
         settings = load_config(config.algo, config.env_id, other.folder(repository) / "config.yaml")
         for name, value in settings.replace(seed=config.seed).as_mapping().items():
             if (own := config.as_mapping()[name]) != value:
@@ -146,6 +142,11 @@ def _check_place(
                     f"its {name} is {own}, but {place}, of the same table, has {value}; runs of a "
                     "table differ by their seed alone"
                 )
+        if again:
+            raise UsageError(
+                f"{place} holds another run of its seed; to put this in its place: "
+                f"rigid-envs results --replace {folder.path}"
+            )
 
 
 def _share(outcome: np.ndarray) -> dict[str, float]:

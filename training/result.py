@@ -14,6 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
+
+import rigid_envs  # noqa: F401  (registers the ids)
 from training.errors import UsageError, nearest
 from training.run_folder import folder_name
 from training.settings import Unfit, choice, integer, mapping, number, optional, setting
@@ -102,11 +105,15 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
 
     Args:
         env_id: Environment id.
-        arguments: Its arguments; those of USUAL are left away, and what is false or 0: such
-            arguments ask for nothing.
+        arguments: Its arguments; those of USUAL are left away, and what asks for nothing: what is
+            false or 0, and the steps that an episode has anyway.
     """
     words = [folder_name(env_id)]
-    for name in sorted({name for name, value in arguments.items() if value} - set(USUAL)):
+    spec = gym.registry.get(env_id)
+    asked = {name for name, value in arguments.items() if value}
+    if spec is not None and arguments.get("max_episode_steps") == spec.max_episode_steps:
+        asked.discard("max_episode_steps")
+    for name in sorted(asked - set(USUAL)):
         value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
         words.append(f"{name}-{value.strip('-')}")
     return "-".join(words)

@@ -2,10 +2,12 @@
 
 import re
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
+from training.config import TrainConfig, load_config
 from training.errors import UsageError
 from training.result import Result, read_results
 from training.run_folder import folder_name
@@ -34,11 +36,16 @@ intervals are Wilson's at 95 %. ± is the standard deviation over seeds.
 _PLACE = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
-def page_text(results: Sequence[Result]) -> str:
-    """The whole of docs/results.md, of results by kind and seed."""
+def page_text(results: Sequence[Result], repository: Path) -> str:
+    """The whole of docs/results.md, of results by kind and seed, and their settings."""
     if not results:
         return f"{HEAD}\n{NONE_YET}\n"
-    return "\n".join([HEAD, *(_section(group) for group in by_kind(results))])
+    sections = []
+    for group in by_kind(results):
+        one = group[0]
+        file = one.folder(repository) / "config.yaml"
+        sections.append(_section(group, load_config(one.algorithm, one.env_id, file)))
+    return "\n".join([HEAD, *sections])
 
 
 def readme_text(text: str, results: Sequence[Result]) -> str:
@@ -103,17 +110,27 @@ def _expected(repository: Path) -> dict[Path, str]:
         readme = (repository / README).read_text(encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{repository / README} cannot be read: {error.strerror}") from None
-    return {PAGE: page_text(results), README: readme_text(readme, results)}
+    return {PAGE: page_text(results, repository), README: readme_text(readme, results)}
 
 
-def _section(group: Sequence[Result]) -> str:
+def _arguments(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"`{name}: {value}`" for name, value in values.items())
+
+
+def _section(group: Sequence[Result], settings: TrainConfig) -> str:
     """A task and algorithm: its table, commands, pictures."""
-    first = group[0]
-    given = ", ".join(f"`{name}: {value}`" for name, value in first.arguments.items())
+    first, given = group[0], _arguments(group[0].arguments)
+    begun = {k: v for k, v in settings.env_kwargs.items() if v != first.arguments.get(k)}
+    before = (
+        f" Trained with {_arguments(begun)} until the last part, of {settings.finish_timesteps:,} "
+        "steps."
+        if begun
+        else ""
+    )
     lines = [
         f"## {first.env_id}, {first.algorithm.upper()}",
         "",
-        f"With {given}." if given else "With the environment's own arguments.",
+        (f"With {given}." if given else "With the environment's own arguments.") + before,
         "",
         "| seed | steps | wall time | in environments "
         "| success at the end | at any time | commit |",

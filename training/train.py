@@ -116,13 +116,20 @@ def train(
         callbacks: More to call at every step, after ours.
 
     Raises:
-        UsageError: The environment refuses its arguments, the device does not exist, or the disk is
-            full; the last checkpoint stays then.
+        UsageError: The environment refuses its arguments, the device does not exist, nothing would
+            be learned, hindsight can't ask for this reward, or the disk is full; the last
+            checkpoint stays then.
     """
+    if isinstance(config, SACConfig) and config.learning_starts >= config.n_timesteps:
+        raise UsageError(
+            f"{config.env_id}: learning_starts is {config.learning_starts}, should be below "
+            f"n_timesteps = {config.n_timesteps}, or nothing is learned"
+        )
     seed = config.seed if config.seed is not None else int(np.random.default_rng().integers(2**31))
     config = dataclasses.replace(config, seed=seed)
     with _worlds_and_model(config, device, num_threads) as (worlds, model):
         policy_file_of(model, config).to_bytes()  # what can't be kept is not worth training
+        _check_hindsight(config, worlds.envs)
         _check_finish(config, worlds)
         folder = create_run_folder(log_folder, config)
         with folder.claimed():
@@ -229,6 +236,15 @@ def _learn(
         left = config.n_timesteps - steps_before
         with _naming_full_disks(folder):
             model.learn(left, callback=callbacks, reset_num_timesteps=steps_before == 0)
+    except RuntimeError as error:
+        if "before the end of the first episode" not in str(error):
+            raise
+        assert isinstance(config, SACConfig)
+        raise UsageError(
+            f"learning_starts is {config.learning_starts}, should be above the "
+            f"steps of the first episodes of all {config.n_envs} worlds: hindsight learns from "
+            "whole episodes"
+        ) from None
     except KeyboardInterrupt:
         interrupted = True
         if isinstance(model, OnPolicyAlgorithm) and checkpoints.rollout_from is not None:
@@ -251,6 +267,19 @@ def _learn(
     )
 
 
+def _check_hindsight(config: TrainConfig, envs: Any) -> None:
+    """Raises UsageError now where hindsight would ask for rewards that nobody can tell."""
+    if not isinstance(config, SACConfig) or config.replay_buffer_class is None:
+        return
+    goal = np.zeros((1, *envs.single_observation_space["desired_goal"].shape))
+    try:
+        envs.compute_reward(goal, goal + 1.0, [{}])
+    except ValueError as error:
+        raise UsageError(
+            f"{config.env_id}: HerReplayBuffer asks for rewards of goals alone: {error}"
+        ) from None
+
+
 def _check_finish(config: TrainConfig, worlds: RigidVecEnv) -> None:
     """Raises UsageError now where the environment would refuse the last part of the run."""
     if not config.finish_timesteps:
@@ -258,6 +287,7 @@ def _check_finish(config: TrainConfig, worlds: RigidVecEnv) -> None:
     envs = make_training_env(config, config.last_env_kwargs)
     try:
         worlds.check_like(envs)
+        _check_hindsight(config, envs)
     except ValueError as error:
         raise UsageError(f"finish_env_kwargs is {config.finish_env_kwargs}: {error}") from None
     finally:

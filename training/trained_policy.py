@@ -1,6 +1,7 @@
 """Trained policies by path: a run folder, a policy file, or a pickle that the user vouches for."""
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +65,11 @@ def trained_policy(
                     + (_leave(folder.model) if folder.model.exists() else "")
                 )
             found = read_policy(folder.policy, algo=config.algo, env_id=env_id or config.env_id)
-            return Policy(
-                found.act, found.env_id, f"{config.algo} ({path})", config.env_kwargs, path
-            )
+            # those that training finished on
+            return replace(found, name=f"{config.algo} ({path})", folder=path)
         return _unpickled(folder.model, algo, env_id, deterministic, device, trust_pickle)
+    if path.suffix not in (SUFFIX, ".zip"):
+        raise UsageError(f"{path} is no policy, should be a run folder, {SUFFIX} file or model.zip")
     if path.suffix != SUFFIX:
         return _unpickled(path, algo, env_id, deterministic, device, trust_pickle)
     if not deterministic:

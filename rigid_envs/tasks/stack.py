@@ -28,8 +28,8 @@ NEAR = 0.15  # m of way, in which the shaped terms fall to 1/e
 OVER, DOWN, CLIMB = 0.05, 0.04, 3.0
 # of the terms of a cube, in what is done of its stage
 STAGE = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
-# m beside its place, at most, and half of the m above it, at which a cube held at the start is
-ABOVE = (0.05, 0.05, 0.04)
+# m beside its place along x and y, and above it, at which a cube held at the start is at most
+ASIDE, HIGHER = 0.05, 0.08
 PLACES = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
 
 
@@ -142,15 +142,28 @@ class Stack(Task):
             cubes, of = position[near], (np.arange(near.sum()), stand[near])
             fingers = self.hand.fingers(np.maximum(cubes[of], self.hand.low))
             held = draws[near, -4] < 0.5 * self.at_hand
-            above = tower[near][of] + np.array(ABOVE) * (2.0 * draws[near, -3:] - (1.0, 1.0, 0.0))
-            above = np.maximum(above, self.hand.low)
+            own = size[near][of]
+            above = self._above(tower[near][of], own, size[near].max(axis=1), draws[near, -3:])
             pads, cube = self._holding(world)
-            pads = above[:, None] + pads - self.hand.home
-            pads[:, :, 1] += HALF * (size[near][of] - 1.0)[:, None] * (-1.0, 1.0)
-            cubes[of] = np.where(held[:, None], above + cube[0] - self.hand.home, cubes[of])
+            pads = above[:, None] + pads - cube
+            pads[:, :, 1] += HALF * (own - 1.0)[:, None] * (-1.0, 1.0)
+            cubes[of] = np.where(held[:, None], above, cubes[of])
             fingers = np.where(held[:, None, None], pads, fingers)
             world.set_state(position=cubes, drive_position=fingers, worlds=worlds)
         return goals
+
+    def _above(self, place: Array, own: Array, largest: Array, draws: Array) -> Array:
+        """[n, 3] m, where cubes of sizes [n] are held: by their place, clear of all other cubes.
+
+        Clear of those in the places around it, which are as large as `largest` [n] at most, and so
+        are the pads, which reach farther along y, and below small cubes.
+        """
+        room = CELL - 2.0 * JITTER - HALF * (own + largest)
+        room = np.stack([room, room - 2.0 * self.hand.PAD], axis=1)
+        beside = np.empty_like(place)
+        beside[:, :2] = np.minimum(np.maximum(room, 0.0), ASIDE) * (2.0 * draws[:, :2] - 1.0)
+        beside[:, 2] = np.maximum(self.hand.PAD - HALF * own, 0.0) + HIGHER * draws[:, 2]
+        return np.maximum(place + beside, self.hand.low)
 
     def _holding(self, world: World) -> tuple[Array, Array]:
         """See `Hand.hold`, of a cube."""

@@ -16,15 +16,17 @@ T = Compound([(Box((0.04, 0.01, 0.015)), (0, 0, 0)), (Box((0.01, 0.02, 0.015)), 
 
 
 @pytest.mark.parametrize("shapes", [(BOX, BOX), (BOX, BALL), (ROD, BALL), (ROD, BOX), (T, BOX)])
-def test_no_sample_is_nearer_than_the_gap_along_the_axes(shapes):
+@pytest.mark.parametrize("size", [None, 1.4])
+def test_no_sample_is_nearer_than_the_gap_along_the_axes(shapes, size):
     scene = Scene([Body(shape, position=(x, 0, 0.1)) for x, shape in enumerate(shapes)], [Ground()])
-    model, features = build(scene, PRESETS["balanced"])
+    model, features = build(scene, PRESETS["balanced"], varied=size is not None)
+    model.side["owner_size"] = size or 1.0
     measure, rng = make_measure(features), np.random.default_rng(0)
     gaps, touching = np.empty(model.side["sample_count"].max()), 0
     for side in model.side.view(np.recarray):
         for _ in range(200):
-            turn = rotation_matrix(rng.normal(size=4))
-            turn /= np.cbrt(np.linalg.det(turn))
+            quaternion = rng.normal(size=4)
+            turn = rotation_matrix(quaternion / np.linalg.norm(quaternion))
             place = rng.uniform(-0.08, 0.08, 3)
             seen = SimpleNamespace(rotation=turn.reshape(9, 1), position=place[:, None])
             measure(model, side, 0, seen, gaps)

@@ -41,6 +41,8 @@ def test_arrays_broadcast_and_name_the_first_bad_entry():
         validation.array("v", np.zeros((2, 4)), (2, 3))
     with pytest.raises(ValueError, match=r"v must be numbers of shape \(2,\), got 'ab'"):
         validation.array("v", "ab", (2,))
+    with pytest.raises(ValueError, match=r"v must be numbers of shape \(1, 0, 3\), got \[\[\[1"):
+        validation.array("v", [[[1.0, 0.0, 0.0]]], (1, 0, 3))
 
 
 def test_a_choice_suggests_the_nearest_name():

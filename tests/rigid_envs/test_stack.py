@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_envs.rewards import distance
-from rigid_envs.tasks.stack import ABOVE, CELL, HALF, JITTER, THRESHOLD, Stack, _way
+from rigid_envs.tasks.stack import ASIDE, CELL, HALF, HIGHER, JITTER, THRESHOLD, Stack, _way
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
 
@@ -87,15 +87,33 @@ def test_a_share_of_episodes_starts_with_the_next_cube_at_hand(fidelity, randomi
         np.testing.assert_array_equal(values[rest], observation[key][rest])
     np.testing.assert_allclose(opening[about], Stack.hand.widest, atol=1e-6)
     way = cube - place
-    assert np.abs(way[moved, :2]).max() <= ABOVE[0] + 1e-3
-    assert way[moved, 2].min() > -0.005
-    assert way[moved, 2].max() <= 2.0 * ABOVE[2] + 1e-3
+    assert np.abs(way[moved, :2]).max() <= ASIDE + 1e-6
+    assert way[moved, 2].min() > -1e-6
+    assert way[moved, 2].max() <= HIGHER + 0.001
 
     grip = np.tile(np.array([0.0, 0.0, 0.0, -1.0], dtype=np.float32), (count, 1))
     for _ in range(10):
-        info = envs.step(grip)[4]
-    assert (info["grasp"] >= 1.0)[moved].all()  # nothing slips
-    assert (info["grasp"] >= 1.0)[about].all()  # all fingers had to do is close
+        observation = envs.step(grip)[0]
+    cube = cubes_of(observation["achieved_goal"])[each, stand]
+    hand, near = observation["observation"][:, :3], moved | about
+    sagged = {"fast": 0.012}.get(fidelity, 0.006)  # until friction has its hold
+    assert np.abs(hand - cube)[near].max() < sagged  # nothing falls, all fingers do is close
+
+
+def test_cubes_held_at_the_start_touch_nothing_else():
+    sizes = {"size": (0.8, 1.2)}
+    envs = make_vec(4000, STACK, blocks=5, at_hand=1.0, begun=0.5, randomize=sizes)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    apart = np.abs(world.position[:, :, None] - world.position[:, None])
+    half = HALF * world.parameters.size
+    overlap = (half[:, :, None] + half[:, None] - apart.transpose(3, 0, 1, 2)).min(axis=0)
+    overlap[:, range(5), range(5)] = -1.0
+    assert overlap.max() < 1e-6
+    pads, pad = world.drive_position, Stack.hand.PAD
+    apart = np.abs(world.position[:, :, None] - pads[:, None])
+    overlap = (half[:, :, None] + pad - apart.transpose(3, 0, 1, 2)).min(axis=0)
+    assert np.sort(overlap.max(axis=2), axis=1)[:, -2].max() < 1e-6  # but for the one held
 
 
 def test_a_way_leads_up_across_and_down():

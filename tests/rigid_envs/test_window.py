@@ -8,7 +8,7 @@ import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from rigid_envs.window import Key, Window
+from rigid_envs.window import Key, NoDisplay, Window
 
 PICTURE = np.zeros((48, 64, 3), np.uint8)
 
@@ -33,6 +33,15 @@ def test_it_opens_with_the_first_picture_and_closes_with_its_user(window):
     assert window.show(PICTURE) == []
     assert not pygame.display.get_init()
     window.close()
+
+
+def test_without_a_display_there_is_no_window(monkeypatch):
+    monkeypatch.delenv("SDL_VIDEODRIVER", raising=False)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    with pytest.raises(NoDisplay, match="there is no display; render_mode="):
+        Window(64, 48).show(PICTURE)
 
 
 def test_it_tells_which_keys_went_down_and_up(window):

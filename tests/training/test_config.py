@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from training.config import ALGORITHMS, PPOConfig, load_config
-from training.errors import UsageError
+from training.errors import UsageError, nearest
 
 ENV = "RigidEnvs/Push-v0"
 
@@ -142,6 +142,16 @@ def test_entropy_coefficient_otherwise_is_refused(value, write_yaml):
 
 def test_large_counts_may_be_written_as_floats(write_yaml):
     assert load(write_yaml, "{n_timesteps: !!float 1e6}").n_timesteps == 1_000_000
+
+
+def test_a_key_beside_the_environments_is_one_that_is_known(write_yaml):
+    file = write_yaml(f"{ENV}: {{n_timesteps: 100}}\ntarget_succes_rate: {{{ENV}: 0.5}}\n")
+    with pytest.raises(UsageError, match=r"'target_succes_rate' is neither .* did you mean 'targ"):
+        load_config("ppo", ENV, file)
+
+
+def test_names_are_known_in_whatever_case():
+    assert nearest("PPO", ["sac", "ppo"]) == "ppo"
 
 
 def test_missing_length_of_training_is_named(write_yaml):

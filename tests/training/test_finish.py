@@ -7,6 +7,7 @@ from training import train as train_module
 from training.errors import UsageError
 from training.policy_file import read_policy
 from training.train import resume, train
+from training.trained_policy import trained_policy
 
 FINER = {"fidelity": "accurate"}
 
@@ -40,7 +41,10 @@ def test_the_last_steps_are_taken_on_the_other_worlds(quick_ppo, tmp_path, made,
     result = train(config, tmp_path, quiet=True)
     assert result.steps == 320
     assert made == ["balanced"] * 30 + ["accurate"] * 10
-    assert read_policy(result.folder.policy).env_kwargs == {"reward_type": "dense", **FINER}
+    last = {"reward_type": "dense", **FINER}
+    assert read_policy(result.folder.policy).env_kwargs == last
+    assert trained_policy(result.folder.path).env_kwargs == last
+    assert trained_policy(result.folder.model, trust_pickle=True).env_kwargs == last
 
 
 def test_hindsight_goes_on_with_whole_episodes(quick_sac, tmp_path, made):

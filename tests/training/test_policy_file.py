@@ -94,7 +94,7 @@ def test_a_file_acts_as_a_bounded_policy_does(quick_ppo, tmp_path):
 def test_a_file_acts_as_sac_does(quick_sac, tmp_path, normalize, monkeypatch):
     monkeypatch.setattr(ReachVectorEnv, "__init__", with_lopsided_actions(ReachVectorEnv.__init__))
     folder = train(quick_sac.replace(normalize=normalize), tmp_path, quiet=True).folder
-    action = read_policy(folder.policy).act(observations())
+    action = read_policy(str(folder.policy)).act(observations())
     expected = trained_policy(folder.model, trust_pickle=True).act(observations())
     np.testing.assert_allclose(action, expected, rtol=1e-6, atol=1e-6)
 
@@ -115,6 +115,17 @@ def test_an_action_does_not_depend_on_how_many_worlds_act(kept):
     together = policy.act(all_of_them)
     alone = [policy.act({k: v[i : i + 1] for k, v in all_of_them.items()})[0] for i in range(50)]
     np.testing.assert_allclose(alone, together[:50], atol=1e-7)
+
+
+def test_what_is_no_policy_is_not_to_be_trusted(tmp_path):
+    (tmp_path / "README.md").write_text("# Policies")
+    with pytest.raises(UsageError, match=r"README.md is no policy, should be .* or model.zip$"):
+        trained_policy(tmp_path / "README.md")
+
+
+def test_one_world_is_told_to_be_an_axis_short(kept):
+    with pytest.raises(UsageError, match=r"of many worlds, this is of one: .* value\[None\]"):
+        read_policy(kept).act({key: value[0] for key, value in observations().items()})
 
 
 def test_reading_takes_neither_torch_nor_stable_baselines(kept):
@@ -148,6 +159,8 @@ def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
             short |= {"policy": full.policy, "policy_kwargs": full.policy_kwargs}
             if algo == "ppo":
                 short |= {"n_steps": 16, "batch_size": 16}
+            else:
+                short |= {"learning_starts": 8}
             folder = train(kind.from_mapping(reach, short, "test"), tmp_path, quiet=True).folder
             assert folder.policy.stat().st_size < 300_000
 

@@ -250,6 +250,28 @@ def test_runs_of_other_settings_are_refused(repository, runs, quick_ppo, change,
     assert [result.seed for result in read_results(repository)] == [3]
 
 
+def test_what_differs_and_has_its_seed_is_told_that_it_differs(repository, runs, quick_ppo):
+    first = sorted((runs / "ppo").iterdir())[0]
+    update(repository, first)
+    (first / "config.yaml").write_text(quick_ppo.replace(gamma=0.5).as_yaml())
+    change(first / "run.json", started="2026-01-01T00:00:00+00:00")
+    (said,) = update(repository, first)
+    assert "its gamma is 0.5" in said
+    assert "--replace" not in said
+
+
+def test_the_page_says_on_what_a_run_began(repository, runs, quick_ppo):
+    first = sorted((runs / "ppo").iterdir())[0]
+    longer = {"reward_type": "dense", "max_episode_steps": 9}
+    config = quick_ppo.replace(
+        env_kwargs=longer, finish_timesteps=80, finish_env_kwargs={"max_episode_steps": 10}
+    )
+    (first / "config.yaml").write_text(config.as_yaml())
+    update(repository, first)
+    page = (repository / "docs/results.md").read_text()
+    assert "Trained with `max_episode_steps: 9` until the last part, of 80 steps." in page
+
+
 def test_other_arguments_make_another_table(repository, runs, quick_ppo):
     first, second = sorted((runs / "ppo").iterdir())
     update(repository, first)
@@ -270,6 +292,7 @@ def test_names_of_tasks_are_names_of_folders():
     # what is observed makes no other task, and 0 asks for nothing
     arguments = {"guided": True, "begun": 0.0, "obstacles": 0}
     assert task_name("RigidEnvs/Stack-v0", arguments) == "RigidEnvs-Stack-v0"
+    assert task_name("RigidEnvs/Stack-v0", {"max_episode_steps": 100}) == "RigidEnvs-Stack-v0"
     assert task_name("RigidEnvs/Stack-v0", {"begun": 0.5}) == "RigidEnvs-Stack-v0-begun-0.5"
 
 
