@@ -297,7 +297,9 @@ def test_reach_is_of_the_place_behind_the_cube_whatever_yaw_is_asked_for():
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
-def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity):
+def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity, stress):
+    if fidelity == "solid" and not stress:
+        pytest.skip("a kernel of its own for half a minute; test_push_block has posts at solid")
     pressed_in = {"fast": 0.006}.get(fidelity, 0.004)
     envs = make_vec(4, obstacles=4, fidelity=fidelity, max_episode_steps=None)
     envs.reset(seed=0)
@@ -314,7 +316,9 @@ def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity):
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
-def test_blind_steps_among_posts_stay_physical(fidelity):
+def test_blind_steps_among_posts_stay_physical(fidelity, stress):
+    if fidelity == "solid" and not stress:
+        pytest.skip("a kernel of its own for half a minute; test_push_block has posts at solid")
     envs = make_vec(256, fidelity=fidelity, obstacles=4, target_yaw=True)
     envs.reset(seed=0)
     world = envs._runner.world
