@@ -209,14 +209,16 @@ def _results(options: argparse.Namespace) -> int:
 def _tune(options: argparse.Namespace) -> int:
     config = config_of(options)
 
-    from training.config import SACConfig
+    from training.config import SACConfig, parse_settings
     from training.tuning import PART, tune
 
     # as many steps as were asked for, or a part of those that the settings have; none to finish on
     steps = config.n_timesteps if options.n_timesteps else max(1, config.n_timesteps // PART)
     full = configured(options)
     kept: dict[str, Any] = {}
-    if isinstance(full, SACConfig):  # the same share of the steps is blind
+    if isinstance(full, SACConfig) and "learning_starts" not in parse_settings(
+        options.hyperparams, "--hyperparams"
+    ):  # the same share of the steps is blind
         kept["learning_starts"] = full.learning_starts
         blind = full.learning_starts * steps // full.n_timesteps
         config = config.replace(learning_starts=blind)
