@@ -89,14 +89,24 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
     shear_mass = 1.0 / (shear[:, a] + shear[:, b])
     levers = np.array([leverage(solid) for solid in solids])
     shear_stiffness, shear_damping = tangential_coefficients(
-        stiffness, pair_mass, shear_mass, levers[a] + levers[b], h
+        stiffness,
+        pair_mass,
+        shear_mass,
+        levers[a] + levers[b],
+        h * np.sqrt(stiffness / (pair_mass * soft)),
+        h,
     )
 
     least = _of_solids(_inertia(layout, p).min(axis=-1), [np.inf] * len(rest))
     turns = (a < layout.bodies) | (b < layout.bodies)  # a tool that meets the ground never does
     turning = np.where(turns, 1.0 / least[:, a] + 1.0 / least[:, b], 1.0)
     twist_stiffness, twist_damping = tangential_coefficients(
-        omega**2 / turning, 1.0 / turning, 1.0 / turning, np.zeros(len(sides)), h
+        omega**2 / turning,
+        1.0 / turning,
+        1.0 / turning,
+        np.zeros(len(sides)),
+        np.array(h * omega),
+        h,
     )
 
     if fidelity.law == "impulse":

@@ -27,7 +27,7 @@ class Contacts(NamedTuple):
 
     Attributes:
         pair: [n, 2] the two solids: bodies first, then drives, then statics, each in scene order.
-        point: [n, 3] m, the middle of the overlap.
+        point: [n, 3] m, the middle of the overlap; on a ground, the sample's lowest.
         normal: [n, 3] unit vector from the second solid to the first.
         overlap: [n] m; negative where solids collided up to half a step before they touch.
         force: [n, 3] N on the first solid; the second feels the opposite. A collision of the

@@ -15,6 +15,7 @@ from rigid_envs.draws import uniform
 from rigid_envs.goals import distance
 from rigid_envs.randomization import Randomization
 from rigid_envs.rewards import GOALS_OF_TERMS, REWARD_TYPES, goals_of_terms
+from rigid_envs.task_checks import check_goals, check_terms, check_written
 from rigid_envs.tasks import Task
 
 Array = np.ndarray
@@ -149,7 +150,8 @@ class Runner:
         self._elapsed[mask] = 0
         self.randomization.draw(self.world, mask, self._seeds[mask], self._episodes[mask])
         draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draws)
-        self._goals[mask] = self.task.start(self.world, mask, draws)
+        goals = self.task.start(self.world, mask, draws)
+        self._goals[mask] = check_goals(self.task, "start", goals, len(draws))
         self._now = self.world.read()
 
     def _randomize(self, mask: Array, randomize: Any) -> None:
@@ -198,16 +200,16 @@ class Runner:
             table[...] = np.nan
         self.task.observe(self.world, now, values[:, :seen])
         if not self._observed:
-            self._check_written("observe", self.task.bounds, values[:, :seen])
+            check_written(self.task, "observe", self.task.bounds, values[:, :seen])
         if self.observe_parameters:
             values[:, seen:told] = self.randomization.observed
         achieved, desired = values[:, split:], self._goals
-        achieved[...] = self.task.achieved(self.world, now)
+        reached = self.task.achieved(self.world, now)
+        achieved[...] = check_goals(self.task, "achieved", reached, self.count)
         if self.guided:
             self.task.guide(self.world, now, achieved, desired, values[:, told:split])
             if not self._observed:
-                self._check_written("guide", self.task.guides, values[:, told:split])
-        self._observed = True
+                check_written(self.task, "guide", self.task.guides, values[:, told:split])
         outside = clip(table, self._low, self._high, self.count)
         self._apart = distance(achieved, desired)
         # as users expect them, a row for each world
@@ -217,23 +219,19 @@ class Runner:
             "desired_goal": desired.copy(),
         }
         success: Array = self.reward.success(self._apart)
+        terms = self.task.terms(self.world, now, achieved, desired, self._apart)
+        if not self._observed:
+            check_terms(self.task, terms, self.count)
+        self._observed = True
         info: dict[str, Array] = {
             "is_success": success,
             "success": success,
             "out_of_bounds": outside,
-            **self.task.terms(self.world, now, achieved, desired, self._apart),
+            **terms,
         }
         if self.reward_type == "dense" and self.reward.of_task:
             info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
         return observation, info
-
-    def _check_written(self, what: str, bounds: Any, values: Array) -> None:
-        """Raises ValueError where a task has left anything of an array [count, n] unwritten."""
-        names = [bound[0] for bound in bounds]
-        left = [name for name, gap in zip(names, np.isnan(values).any(axis=0), strict=True) if gap]
-        if left:
-            name = type(self.task).__name__
-            raise ValueError(f"{name}.{what} must write all of out, it has left {left}")
 
     def check_actions(self, actions: Any) -> Array:
         """Actions [count, actions] within [-1, 1].

@@ -17,7 +17,7 @@ class Policy:
     """What acts, and on what."""
 
     act: Controller
-    """Takes observations `{key: (n, k)}`, returns actions `(n, action_dim)`."""
+    """Takes observations, a dict of (n, k) arrays, returns actions (n, action_dim)."""
     env_id: str
     """Environment that it acts on."""
     name: str

@@ -1,9 +1,8 @@
 """Contact forces: every side's candidates against its surface, and the wrenches on both solids.
 
-All of a side is worked out in the frame of its surface, where the surface is at rest. The contact
-point lies in the middle of the overlap and both solids feel opposite forces at it, so momentum and
-angular momentum are kept. A slot holds a candidate of each lane, or zeros; the loop over lanes has
-no branch.
+All of a side is worked out in the frame of its surface, where the surface is at rest. Both solids
+feel opposite forces at the contact point, so momentum and angular momentum are kept. A slot holds a
+candidate of each lane, or zeros; the loop over lanes has no branch.
 """
 
 from functools import cache

@@ -4,14 +4,23 @@ The state is (c, q, P, L). A substep is half a kick, a drift, new forces, half a
 depend on velocity see the half-step velocity of the drift. Without torque L is constant to the last
 bit, and omega = J^-1 L is not: the midpoint rule turns by omega at the orientation half a step
 ahead.
+
+The midpoint rule loses track of the energy where L would turn the body far about its slimmest
+axis: a rod of 5 by 6 by 40 mm that tumbled at 0.26 rad a substep, its L good for 7 rad about its
+length, had 26 times its energy after 0.4 s, and thin solids seemed to gain theirs in collisions. So
+such a turn is made in parts, each within SMALL_TURN.
 """
 
+import math
 from functools import cache
 
 from physics.features import GENERAL, NO_ROTATION
 from physics.jit import LANES, at, stage
 from physics.rotation import SMALL_TURN, turn, turn_far
 from physics.stages.kinematics import spin_of
+
+# beyond 30 rad a substep parts are longer than SMALL_TURN
+MOST_PARTS = 100.0
 
 
 @cache
@@ -117,14 +126,22 @@ def make_drift(features):
                     jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
                     square, reach = longest(jx, jy, jz, time), time * at(reaches, i)
                     lx, ly, lz = L[0, i], L[1, i], L[2, i]
-                    if not lx * lx + ly * ly + lz * lz <= square:
-                        x, y, z, w, ox, oy, oz = turning_far(
-                            q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz, time
-                        )
+                    momentum = lx * lx + ly * ly + lz * lz
+                    if not momentum <= square:
+                        # what isn't finite takes one part, and stays so
+                        parts = math.sqrt(momentum / square) if momentum > square else 1.0
+                        parts = math.ceil(min(MOST_PARTS, parts))
+                        x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
+                        fastest = 0.0
+                        for _ in range(parts):
+                            x, y, z, w, ox, oy, oz = turning_far(
+                                x, y, z, w, jx, jy, jz, lx, ly, lz, time / parts
+                            )
+                            fastest = max(fastest, abs(ox) + abs(oy) + abs(oz))
                         q[0, i] = x
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        swing[i] = reach * (abs(ox) + abs(oy) + abs(oz))
+                        swing[i] = reach * fastest
 
     return drift

@@ -1,6 +1,9 @@
 """Where a candidate touches: the point, the normal and the overlap, in the frame of the surface.
 
-The contact point lies in the middle of the overlap, on the line from the sample along the normal.
+The contact point lies on the line from the sample along the normal. Between two solids it lies in
+the middle of the overlap. The ground is taken as rigid and the solid's surface as undeformed: there
+the point is the sample's lowest, so friction acts at the arm that a rigid body has. With the middle
+of the overlap here, too, an oblique impact that sticks was 3e-3 off at `balanced`.
 """
 
 import math
@@ -47,7 +50,7 @@ def make_touch(kind, compound):
         rz = R[6, i] * x + R[7, i] * y + R[8, i] * z
         if plane:
             overlap = radius - (rz + (c[2, i] - ca))
-            return rx, ry, rz - (owner_radius - 0.5 * overlap), 0.0, 0.0, 1.0, overlap, 0.0
+            return rx, ry, rz - owner_radius, 0.0, 0.0, 1.0, overlap, 0.0
         px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
         face = 0.0
         if particles:

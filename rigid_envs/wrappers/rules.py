@@ -20,7 +20,7 @@ _KEEP_INFOS = (
 class ActionPenalty(Rule):
     """Charges for large actions.
 
-    r' = r - weight |a|^2, of the action within its space. Info: `action_square`, |a|^2.
+    r' = r - weight `|a|^2`, of the action within its space. Info: `action_square`, `|a|^2`.
 
     Args:
         weight: at least 0.
@@ -49,8 +49,8 @@ class ActionPenalty(Rule):
 class SmoothnessPenalty(Rule):
     """Charges for actions that differ from the one before.
 
-    r' = r - weight |a - a_before|^2, and r in the first step of an episode. Info:
-    `action_change`, |a - a_before|^2.
+    r' = r - weight `|a - a_before|^2`, and r in the first step of an episode. Info:
+    `action_change`, `|a - a_before|^2`.
 
     Args:
         weight: at least 0.

@@ -54,7 +54,7 @@ class StagedReward(Rule):
     `unstaged_reward`.
 
     Args:
-        stages: `Stage`s in their order; end with one of "success", or nearly solved pays as much.
+        stages: in their order; end with one of "success", or nearly solved pays as much.
     """
 
     stages: Sequence[Stage]

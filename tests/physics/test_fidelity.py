@@ -13,7 +13,7 @@ LIMITS = {"contact_resolution": 0.7, "spacing": 1.0, "rounding": 0.5, "skin": 1.
 
 def test_presets_grow_finer():
     steps = [PRESETS[name].substep for name in ("fast", "balanced", "accurate")]
-    assert steps == [4e-3, 2e-3, 0.25e-3]
+    assert steps == [0.02 / 7, 2e-3, 0.25e-3]
     spacings = [PRESETS[name].spacing for name in ("fast", "balanced", "accurate")]
     assert spacings == sorted(spacings, reverse=True)
     assert Fidelity() == PRESETS["balanced"]

@@ -45,9 +45,8 @@ def test_an_oblique_impact_slides_or_sticks_as_coulomb_says(friction, along):
     world = World(scene, "solid")
     world.advance(0.5)
     x, z, spin = closed_forms.oblique_impact(along, down, friction, restitution, radius)
-    # found while they overlap, which shortens the lever by half of that
-    np.testing.assert_allclose(world.linear_velocity[0, 0], (x, 0.0, z), rtol=2e-3)
-    np.testing.assert_allclose(world.angular_velocity[0, 0], (0.0, spin, 0.0), rtol=2e-3)
+    np.testing.assert_allclose(world.linear_velocity[0, 0], (x, 0.0, z), rtol=1e-12)
+    np.testing.assert_allclose(world.angular_velocity[0, 0], (0.0, spin, 0.0), rtol=1e-12)
 
 
 def test_without_restitution_a_cube_stays_where_it_lands():
@@ -85,6 +84,15 @@ def test_no_collision_gains_energy(shapes, restitution, friction):
     assert met.sum() > 0.5 * world.count
     if len(shapes) == 2:
         assert np.abs(world.linear_momentum() - momentum).max() < 1e-15
+
+
+def test_no_collision_of_thin_rods_gains_energy(stress):
+    """They leave it spinning fast about their length."""
+    if not stress:
+        pytest.skip("a kernel of its own for half a minute; see make stress")
+    rod = Box((0.0025, 0.0025, 0.02))
+    for friction in (0.01, 0.5, 2.0):
+        assert energy_gain(grazing((rod, rod), 0.95, friction, "solid")) <= 1e-4
 
 
 # --- sliding and resting ------------------------------------------------------------------------

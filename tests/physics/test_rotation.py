@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from physics import rotation
+from physics import Body, Box, Scene, rotation
 from physics.reference.scenes import torque_free_box
 from physics.world import World
 
@@ -86,6 +86,17 @@ def test_yaw_is_the_last_turn_about_z():
     q = Rotation.from_euler("ZYX", np.stack([yaws, pitches, rolls], axis=-1)).as_quat()
     np.testing.assert_allclose(rotation.yaw(q), yaws, atol=1e-12)
     np.testing.assert_allclose(rotation.yaw(rotation.from_yaw(yaws)), yaws, atol=1e-15)
+
+
+@pytest.mark.parametrize(("spin", "error"), [(12.5, 2e-6), (75.0, 1e-5), (1000.0, 2e-3)])
+def test_a_tumbling_rod_keeps_its_energy(spin, error):
+    """Its momentum would turn it far about its length in a step: by 1.2, 7 and 97 rad."""
+    rod = Body(Box((0.0025, 0.003, 0.02)), mass=0.1, angular_velocity=(spin, spin, spin))
+    world = World(Scene([rod], gravity=(0.0, 0.0, 0.0)))
+    before = world.kinetic_energy()[0]
+    for _ in range(20):
+        world.advance(0.02)
+        assert world.kinetic_energy()[0] == pytest.approx(before, rel=error)
 
 
 def test_a_million_steps_leave_a_quaternion_at_length_one():
