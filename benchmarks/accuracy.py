@@ -29,6 +29,10 @@ from physics.reference.scenes import torque_free_box
 SLAB = (0.1, 0.1, 0.02)  # m, half extents
 
 
+def _peer(step: float) -> str:
+    return f"MuJoCo {1e3 * step:.3g} ms"
+
+
 def _engines() -> dict[str, Make]:
     """Ours by preset, then MuJoCo at the step of each."""
 
@@ -40,7 +44,7 @@ def _engines() -> dict[str, Make]:
 
     presets = {name: partial(ours, fidelity) for name, fidelity in PRESETS.items()}
     steps = [fidelity.substep for fidelity in PRESETS.values()]
-    return {**presets, **{f"MuJoCo {1e3 * h:g} ms": partial(theirs, h) for h in steps}}
+    return {**presets, **{_peer(h): partial(theirs, h) for h in steps}}
 
 
 def restitution_rows() -> Iterator[list[Cell]]:
@@ -86,7 +90,7 @@ def measure() -> Iterator[Table]:
     for (name, bar), test in tests.items():
         errors = {engine: test(make) for engine, make in engines.items()}
         step = PRESETS["balanced"].substep
-        ours, theirs = errors["balanced"], errors[f"MuJoCo {1e3 * step:g} ms"]
+        ours, theirs = errors["balanced"], errors[_peer(step)]
         ratio = theirs / ours if theirs < 1e6 * ours else "> 1e6"
         rows.append([name, bar, *errors.values(), ratio])
     columns = ["error", "bar", *engines, "MuJoCo / balanced"]

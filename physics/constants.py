@@ -11,7 +11,7 @@ from physics.layout import Layout, leverage, pair_stiffness
 from physics.parameters import Parameters
 from physics.scene import Body, Drive, Ground
 from physics.shapes import PLANE, Shape
-from physics.stages.friction import tangential_coefficients
+from physics.stages.friction import SHEAR_RATIO, shear_ratio, tangential_coefficients
 from physics.stages.normal_force import damping_coefficients, rest_speed
 
 Array = np.ndarray
@@ -93,7 +93,7 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         pair_mass,
         shear_mass,
         levers[a] + levers[b],
-        h * np.sqrt(stiffness / (pair_mass * soft)),
+        np.where(np.isnan(given), shear_ratio(fidelity.contact_resolution), SHEAR_RATIO),
         h,
     )
 
@@ -105,7 +105,7 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         1.0 / turning,
         1.0 / turning,
         np.zeros(len(sides)),
-        np.array(h * omega),
+        np.array(SHEAR_RATIO),
         h,
     )
 

@@ -76,7 +76,8 @@ class Fidelity:
 
 
 PRESETS: dict[str, Fidelity] = {
-    # the longest step at which every task can be done: at 4 ms, towers of three buckle
+    # of the steps that cut a frame of 40 ms into two collision steps, the longest at which towers
+    # of three stand: at 3.3 and 4 ms they buckle
     "fast": Fidelity(substep=0.02 / 7, collision_substeps=7),
     "balanced": Fidelity(),
     "accurate": Fidelity(substep=0.25e-3, contact_resolution=0.2, spacing=0.25),

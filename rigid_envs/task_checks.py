@@ -1,13 +1,20 @@
-"""What a task of one's own gives is looked at once, so that mistakes are told where they are."""
+"""What a task of one's own gives is looked at, so that mistakes are told where they are.
+
+The shape of its goals always, which costs little; the rest at the first observation. Values of
+goals and terms are taken as they are.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from rigid_envs.rewards import GOALS_OF_TERMS, OF_GOALS
 from rigid_envs.tasks import Task
 
 Array = np.ndarray
+
+TAKEN = (*OF_GOALS, GOALS_OF_TERMS, "is_success", "out_of_bounds")
 
 
 def check_goals(task: Task, what: str, goals: Any, count: int) -> Array:
@@ -34,7 +41,11 @@ def check_written(task: Task, what: str, bounds: Sequence[Any], values: Array) -
 
 
 def check_terms(task: Task, terms: Any, count: int) -> None:
-    """Raises ValueError where terms [count] are none, or the reward weighs others."""
+    """Raises ValueError for terms that aren't arrays [count] by name, or other than they should be.
+
+    They have every term that the reward weighs, whatever the reward's type, and none of a name that
+    the info or the reward has already.
+    """
     where = _method(task, "terms")
     if not isinstance(terms, Mapping):
         raise ValueError(f"{where} must return a dict of arrays [{count}], got {_seen(terms)}")
@@ -44,6 +55,9 @@ def check_terms(task: Task, terms: Any, count: int) -> None:
                 f"{where} must return arrays of shape ({count},), one value a world, got "
                 f"{_seen(term)} for {name!r}"
             )
+    taken = [name for name in terms if name in TAKEN]
+    if taken:
+        raise ValueError(f"{where} must not return {taken}: the runner tells these itself")
     missing = [name for name in task.reward.of_task if name not in terms]
     if missing:
         raise ValueError(
@@ -57,4 +71,4 @@ def _method(task: Task, name: str) -> str:
 
 
 def _seen(value: Any) -> str:
-    return f"shape {np.shape(value)}" if isinstance(value, np.ndarray) else repr(value)
+    return f"shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.80}"

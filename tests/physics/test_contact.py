@@ -252,9 +252,10 @@ def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction, along, fideli
     world = World(scene, fidelity)
     world.advance(0.5)
     x, z, spin = closed_forms.oblique_impact(along, down, friction, restitution, radius)
-    assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=1e-3)
+    sticks = 3.5 * friction * (1.0 + restitution) * down > 2.0 * along  # well before the end
+    assert world.linear_velocity[0, 0, 0] == pytest.approx(x, rel=2e-5 if sticks else 1e-3)
     assert world.linear_velocity[0, 0, 2] == pytest.approx(z, abs=2.0 * impulse)
-    assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=impulse)
+    assert world.angular_velocity[0, 0, 1] == pytest.approx(spin, rel=5e-5 if sticks else impulse)
 
 
 SPRINGS = ["fast", "balanced", "accurate"]

@@ -49,6 +49,11 @@ class TallTerm(Push):
         return {"reach": super().terms(*args)["reach"][:, None]}
 
 
+class OwnSuccess(Push):
+    def terms(self, *args):
+        return {**super().terms(*args), "is_success": np.ones(1)}
+
+
 @pytest.mark.parametrize(
     ("task", "told"),
     [
@@ -59,6 +64,7 @@ class TallTerm(Push):
         (NoTerms, r"NoTerms\.terms must return a dict .*got None"),
         (LackingTerm, r"LackingTerm\.terms must .*\['reach'\] is missing from \[\]"),
         (OneTermForAll, r"OneTermForAll\.terms must .*shape \(1,\).*got -0\.1 for 'reach'"),
+        (OwnSuccess, r"OwnSuccess\.terms must not return \['is_success'\]"),
         (TallTerm, r"TallTerm\.terms must .*got shape \(1, 1\) for 'reach'"),
     ],
 )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from physics import PRESETS as FIDELITIES
 from rigid_envs.tasks.throw import ASIDE, FARTHEST, GRAVITY, NEAREST, RADIUS, Throw
 from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
@@ -10,7 +11,7 @@ from training.scripted import CONTROLLERS
 EPISODE = 50
 HOLD, DROP = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
 # s, of the presets' substeps
-STEPS = {"fast": 4e-3, "balanced": 2e-3, "accurate": 0.25e-3, "solid": 2e-3}
+STEPS = {name: fidelity.substep for name, fidelity in FIDELITIES.items()}
 
 
 def test_targets_are_out_of_reach_and_none_is_solved_at_the_start():
