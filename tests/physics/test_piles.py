@@ -52,7 +52,7 @@ def test_the_wave_along_dominoes_converges_with_the_step():
     + [(10.0, Fidelity(substep=1e-3))],
 )
 def test_two_cards_lean_against_each_other(degrees, fidelity):
-    """At balanced and 10 degrees a slow mode grows from round-off: its energy eightfold in 0.25 s."""
+    """At balanced and 10 degrees a slow mode grows from round-off, eightfold in 0.25 s."""
     world = settled(scenes.leaning_cards(math.radians(degrees)), fidelity)
     assert drift(world, 10.0) < 1e-4
     assert world.position[0, 0, 2] > 0.039
