@@ -40,6 +40,7 @@ SOLID = np.dtype(
         ("pressed", "f8", (LANES,)),  # N, sum of normal forces
         ("bearing", "f8", (LANES,)),  # sum of the weights that touch
         ("mass_rate", "f8", (LANES,)),  # kg/s, see begin_side
+        ("per_mean", "f8", (LANES,)),  # 1/N, likewise
         ("lasts", "f8", (LANES,)),  # 1 where contacts keep what they have become, see begin_side
     ],
     align=True,
@@ -54,7 +55,9 @@ MEETING = np.dtype(
         ("first_touch", "f8", (LANES,)),  # s, NaN before
         ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
         ("bore", "f8", (LANES,)),  # weight that touched in the last step
-        ("bearing", "f8", (LANES,)),  # in this step
+        # of springs, in this step
+        ("bearing", "f8", (LANES,)),  # weight that touches
+        ("presses", "f8", (LANES,)),  # N, sum of the normal forces
         ("slots", "i8"),  # the largest count
     ],
     align=True,

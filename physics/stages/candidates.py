@@ -16,6 +16,7 @@ from physics.group import count_slots
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
 from physics.stages.gaps import gap_along_axes, make_measure
+from physics.stages.impacts import NEAR
 from physics.stages.manifold import make_choose, note
 from physics.stages.relative import relative_pose
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
@@ -206,7 +207,7 @@ def make_search(features):
         reach = at(side.skin, i)
         if impulse and side.partner_count == 0:
             # what is met by the middle of the next drift collides before it overlaps
-            reach = max(reach, 0.5 * path)
+            reach = max(reach, 0.5 * path + 2.0 * NEAR)
         count = 0
         travel = gap
         if not gap > reach:
@@ -220,6 +221,7 @@ def make_search(features):
         meeting.travel[i] = travel
         if before == 0 or count == 0:
             meeting.bore[i] = 0.0
+            meeting.pressed[i] = 0.0
 
     return search, clear
 

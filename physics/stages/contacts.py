@@ -19,6 +19,9 @@ from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
 from physics.stages.touch import HIDDEN, make_touch
 
+# N, of a pair, below which its samples' shares of it tell nothing
+_LEAST_FORCE = 1e-200
+
 # one row a slot: what a report tells of the candidates there
 REPORT = np.dtype(
     [
@@ -52,7 +55,8 @@ def make_loop(features, kind, report):
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
         stiffness, damping, floors = constants.stiffness, constants.damping, constants.rest_speed
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
-        frictions, mass_rates, bearing = constants.friction, seen.mass_rate, seen.bearing
+        frictions, mass_rates, per_means = constants.friction, seen.mass_rate, seen.per_mean
+        bearing = seen.bearing
         pair_mass, yielding = constants.pair_mass, constants.yielding
         centre = constants.surface_centre
         sharp = constants.sharp != 0
@@ -105,6 +109,7 @@ def make_loop(features, kind, report):
                     inverse_mass,
                     h,
                     mass_rate,
+                    per_means[i],
                     memory,
                     loads[i],
                     befores[i],
@@ -277,25 +282,27 @@ def make_begin_side(features):
 
     @stage
     def begin_side(model, work, k, h, seen):
-        """Of a pair, the mass rate is m / (W h).
+        """Of a pair, the mass rate is m / (W h), and 1 over the mean force is W / F.
 
-        W is the share of its stiffness that bore in the last step. It is zero where nothing bore. A
-        step of no length is a look, and a lane at rest has no step: neither lasts. The loop finds
-        all of this in `seen`, for LLVM compares the places of all arrays in it with each other
-        before every turn.
+        In the last step W, a share of its stiffness, bore the normal force F. Both are zero where
+        nothing bore. A step of no length is a look, and a lane at rest has no step: neither lasts.
+        The loop finds all of this in `seen`, for LLVM compares the places of all arrays in it with
+        each other before every turn.
         """
         meeting, side, active = work.side[k], model.side[k], work.lane[0].active
         other = work.side[max(side.mirror, 0)]
         pair_mass = side.pair_mass
         if compound:
-            sum_bore(model, work, k, seen.bearing)
+            sum_bore(model, work, k, seen.bearing, seen.pressed)
         for i in range(LANES):
             rate = at(pair_mass, i) / h if h > 0.0 else 0.0
             if compound:
-                share = seen.bearing[i]
+                share, force = seen.bearing[i], seen.pressed[i]
             else:
                 share = meeting.bore[i] + (other.bore[i] if side.mirror >= 0 else 0.0)
+                force = meeting.pressed[i] + (other.pressed[i] if side.mirror >= 0 else 0.0)
             seen.mass_rate[i] = rate / share if share > 0.0 else 0.0
+            seen.per_mean[i] = share / force if force > _LEAST_FORCE else 0.0
             seen.lasts[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             seen.bearing[i] = 0.0
             seen.pressed[i] = 0.0
@@ -304,15 +311,17 @@ def make_begin_side(features):
 
 
 @kernel
-def sum_bore(model, work, k, total):
+def sum_bore(model, work, k, total, force):
     """Sums what bore in the last step over all sides of a pair: those of compounds have several."""
     for i in range(LANES):
         total[i] = work.side[k].bore[i]
+        force[i] = work.side[k].pressed[i]
     other = model.side[k].next
     while other != k:
-        bore = work.side[other].bore
+        bore, pressed = work.side[other].bore, work.side[other].pressed
         for i in range(LANES):
             total[i] += bore[i]
+            force[i] += pressed[i]
         other = model.side[other].next
 
 
@@ -353,13 +362,15 @@ def make_contacts(features):
                 constants = model.side[k]
                 owner = work.solid[constants.owner]
                 seen = owner if constants.kind == PLANE else work.relative[0]
-                note_touch(model, state, work, g, k, seen.pressed, elapsed)
                 for i in range(LANES):
                     work.side[k].bearing[i] = seen.bearing[i]
+                    work.side[k].presses[i] = seen.pressed[i]
+        # after all: the sides of a pair read what all of them bore in the last step
         keeps = work.lane[0].keeps
         for k in range(model.side.shape[0]):
             meeting = work.side[k]
             if meeting.slots > 0:
+                note_touch(model, state, work, g, k, meeting.presses, elapsed)
                 for i in range(LANES):
                     meeting.bore[i] = meeting.bearing[i] if keeps[i] != 0 else meeting.bore[i]
 

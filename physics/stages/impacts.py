@@ -26,6 +26,9 @@ from physics.stages.points import cross, ends, give, slip
 # Rounds end when none has changed a speed by more than this share of the fastest approach, or after
 # so many
 SMALL, ROUNDS = 1e-6, 64
+# m, of what will have touched: a face that arrives just then shall not, by round-off, land on some
+# of its corners
+NEAR = 1e-9
 
 
 @kernel
@@ -39,7 +42,7 @@ def find(points, owner, surface, constants, h, lane):
             ux, uy, uz = slip(owner, surface, point, i)
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
             un = ux * nx + uy * ny + uz * nz
-            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= 0.0)
+            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= NEAR)
             collides = collides & (point.weight[i] > 0.0)
             point.bounce[i] = e if collides else -1.0
             point.hit[i] = 0.0
