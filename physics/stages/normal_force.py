@@ -150,8 +150,8 @@ def overlap_force(
     speed = 0.0 if turned else abs(memory)
     speed = max(max(speed, approach), floor)
     change, ahead = approach - before, load * per_mean
-    near = min(ahead, 1.0) if change < 0.0 else 1.0
-    rate = mass_rate * (ahead if ahead > AHEAD else near)
+    by_force = (ahead > AHEAD) | ((ahead < 1.0) & (change < 0.0))
+    rate = mass_rate * (ahead if by_force else 1.0)
     outside = load + rate * change if memory != 0.0 else 0.0
     outside = min(max(outside, 0.0), k * max(overlap, 0.0))
     # a pressed contact is at rest under its load as a lying body is under its weight
