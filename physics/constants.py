@@ -19,10 +19,11 @@ Columns = dict[str, Array]
 # How much faster a cube rocks on its face than it bobs, in stiffness by mass. A plate rocks twice
 # as fast again, and would outrun the step: its contacts are that much softer
 _CUBE = 9.0 / 8.0
-# Least restitution of what is as soft as none could be, by springs. Damping that ends a landing
-# within a step is too strong for rocking that is faster than the landing: a thin rod, or a plate,
-# rose to six times its energy at e = 0, and one that landed flat rebounded with up to 1.3 v
-_THIN = 0.12
+# Floor of the restitution of such bodies by springs, times 1 - soft and contact_resolution. Damping
+# that ends a landing within a step is too strong for rocking that is faster than the landing: a
+# thin rod, or a plate, rose to six times its energy at e = 0, and one that landed flat rebounded
+# with up to 1.3 v. The shorter a step is for the contact, the stronger the damping may be
+_THIN = 0.24
 # of the impulse law: the damping ratio of a soft contact, and the steps of free fall whose speed
 # counts as rest
 SOFT_DAMPING, REST_STEPS = 1.0, 4.0
@@ -117,8 +118,8 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
         slowest = np.full(stiffness.shape, REST_STEPS * g * h)
     else:
-        least = _THIN * (1.0 - soft)
-        damping = damping_coefficients(np.maximum(restitution, least), fidelity.damping)
+        floor = _THIN * fidelity.contact_resolution * (1.0 - soft)
+        damping = damping_coefficients(np.maximum(restitution, floor), fidelity.damping)
         slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
 
     # grounds have no width that counts, and statics none that limits the skin

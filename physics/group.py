@@ -54,10 +54,10 @@ MEETING = np.dtype(
         ("path", "f8", (LANES,)),  # m that they have done so at most in the last drift
         ("first_touch", "f8", (LANES,)),  # s, NaN before
         ("pressed", "f8", (LANES,)),  # N, sum of the normal forces of the last step
-        ("bore", "f8", (LANES,)),  # weight that touched in the last step
-        # of springs, in this step
-        ("bearing", "f8", (LANES,)),  # weight that touches
-        ("presses", "f8", (LANES,)),  # N, sum of the normal forces
+        # of springs: weight that touched in the last step, and in this one; and the N of this one
+        ("bore", "f8", (LANES,)),
+        ("bearing", "f8", (LANES,)),
+        ("presses", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
     ],
     align=True,
@@ -344,5 +344,6 @@ def store(model, state, work, g, i, time):
         found.count = side.count[i]
         found.travel = side.travel[i]
         state.touch[k, FIRST_TOUCH, w] = side.first_touch[i]
+        # by impulses `choose` may have emptied a list after the search
         state.touch[k, PRESSED, w] = side.pressed[i] if side.count[i] > 0 else 0.0
         found.bore = side.bore[i]

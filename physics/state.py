@@ -36,7 +36,8 @@ FOUND = np.dtype(
     align=True,
 )
 
-# what is asked of a side after every frame, by its place in State.touch
+# what is asked of a side after every frame, by its place in State.touch; of springs the next step
+# reads PRESSED too, with `bore`
 PRESSED = 0  # N, sum of the normal forces of the last step
 FIRST_TOUCH = 1  # s, NaN before
 FIRST_POSITION = 2  # and the two behind it: m, where the pair's first solid was then

@@ -16,7 +16,7 @@ from physics.group import count_slots
 from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PLANE, SPHERE
 from physics.stages.gaps import gap_along_axes, make_measure
-from physics.stages.impacts import NEAR
+from physics.stages.impacts import ALMOST
 from physics.stages.manifold import make_choose, note
 from physics.stages.relative import relative_pose
 from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
@@ -206,8 +206,9 @@ def make_search(features):
             gap = max(gap, gap_along_axes(side, i, seen))
         reach = at(side.skin, i)
         if impulse and side.partner_count == 0:
-            # what is met by the middle of the next drift collides before it overlaps
-            reach = max(reach, 0.5 * path + 2.0 * NEAR)
+            # what is met by the middle of the next drift collides before it overlaps; beyond what
+            # `find` of impacts accepts, by more than round-off
+            reach = max(reach, 0.5 * path + 2.0 * ALMOST)
         count = 0
         travel = gap
         if not gap > reach:
@@ -219,7 +220,7 @@ def make_search(features):
             clear(state.candidate[g, first + n], i)
         meeting.count[i] = count
         meeting.travel[i] = travel
-        if before == 0 or count == 0:
+        if count == 0:
             meeting.bore[i] = 0.0
             meeting.pressed[i] = 0.0
 
@@ -335,6 +336,7 @@ def make_forget(features):
                     meeting.count[i] = 0
                     meeting.travel[i] = -1.0
                     meeting.bore[i] = 0.0
+                    meeting.pressed[i] = 0.0
         for i in range(LANES):
             lane.keeps[i] = lane.stale[i]
 

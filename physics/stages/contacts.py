@@ -19,7 +19,7 @@ from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
 from physics.stages.touch import HIDDEN, make_touch
 
-# N, of a pair, below which its samples' shares of it tell nothing
+# N, of a pair; below it W / F could overflow
 _LEAST_FORCE = 1e-200
 
 # one row a slot: what a report tells of the candidates there
@@ -312,7 +312,7 @@ def make_begin_side(features):
 
 @kernel
 def sum_bore(model, work, k, total, force):
-    """Sums what bore in the last step over all sides of a pair: those of compounds have several."""
+    """Sums W and F of the last step over all sides of a pair: those of compounds have several."""
     for i in range(LANES):
         total[i] = work.side[k].bore[i]
         force[i] = work.side[k].pressed[i]

@@ -28,7 +28,7 @@ from physics.stages.points import cross, ends, give, slip
 SMALL, ROUNDS = 1e-6, 64
 # m, of what will have touched: a face that arrives just then shall not, by round-off, land on some
 # of its corners
-NEAR = 1e-9
+ALMOST = 1e-9
 
 
 @kernel
@@ -42,7 +42,7 @@ def find(points, owner, surface, constants, h, lane):
             ux, uy, uz = slip(owner, surface, point, i)
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
             un = ux * nx + uy * ny + uz * nz
-            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= NEAR)
+            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= ALMOST)
             collides = collides & (point.weight[i] > 0.0)
             point.bounce[i] = e if collides else -1.0
             point.hit[i] = 0.0

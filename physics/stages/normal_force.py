@@ -15,11 +15,13 @@ which `damping_coefficient` solves for a. Two details make the discrete law as g
   L follows from the last step, L = f + m (u - u_before) / h, kept within 0 and k d.
   A face, an edge and a corner bear different shares W of the pair's stiffness, however many samples
   stand for them. f is that of a whole face, so for L it moves m / W, with the W that last touched.
-  With F, the pair's force, their mean is F / W. Where a cube lands on its corner, the samples
-  around it come to touch and bear little yet. Were all alike, the corner would seem loaded with
-  what they can't take, and rebound a tenth too fast: a sample that bears more than `AHEAD` of the
-  mean counts by its force, with f / F in place of 1 / W. So do those below the mean where the load
-  is less than F, for they can't give what they don't bear. Where it is more, it presses all alike.
+  Let F be the pair's normal force in the last step, and so F / W the mean of f over what touched.
+  Where a cube lands on its corner, the samples around it come to touch and bear little yet. Were
+  all alike, the corner would seem loaded with what they can't take, and rebound a tenth too fast.
+  So a sample whose f is above `_AHEAD` times the mean counts by its force, with f / F in place of
+  1 / W; so does one below the mean whose approach slows, u < u_before, for it can't give what it
+  doesn't bear. By either rule alone the loads of all samples sum to F + m (u - u_before) / h; where
+  both are at work L is estimated a little too high.
 - The kick of a step is the mean force over the step centred at the present position, along which
   the overlap moves by b = h |u| / 2 either way: where it crosses zero, the mean of max(0, d) is
   (d + b)^2 / (4 b). Restitution no longer depends on where in a step the touch falls: at
@@ -48,7 +50,7 @@ _CALM = 2.0
 # times the mean force of what touches. Those of a cube that leans in a tower differ by less: there
 # a share that grows with the force would be a spring that softens, and at `fast` every fifth tower
 # of three would sway apart
-AHEAD = 1.6
+_AHEAD = 1.6
 # below this restitution the approach ends within the step's resolution anyway
 _LEAST_RESTITUTION = 5e-4
 
@@ -135,7 +137,7 @@ def overlap_force(
         inverse_mass: 1/kg of the pair, at this point if it is its only sample.
         h: s.
         mass_rate: kg/s, m / (W h), of the same mass: else the load that it tells swings.
-        per_mean: 1/N, W / F.
+        per_mean: 1/N, W / F of the last step, 0 where nothing bore.
         memory: m/s, impact speed, negative while separating, 0 while apart.
         load: N, last step's force.
         before: m/s, last step's approach.
@@ -150,7 +152,7 @@ def overlap_force(
     speed = 0.0 if turned else abs(memory)
     speed = max(max(speed, approach), floor)
     change, ahead = approach - before, load * per_mean
-    by_force = (ahead > AHEAD) | ((ahead < 1.0) & (change < 0.0))
+    by_force = (ahead > _AHEAD) | ((ahead < 1.0) & (change < 0.0))
     rate = mass_rate * (ahead if by_force else 1.0)
     outside = load + rate * change if memory != 0.0 else 0.0
     outside = min(max(outside, 0.0), k * max(overlap, 0.0))

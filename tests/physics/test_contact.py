@@ -276,14 +276,15 @@ def test_damping_however_strong_takes_no_more_than_there_is(shapes, fidelity):
         assert energy_gain(grazing(shapes, restitution, friction, fidelity)) <= 0.0
 
 
-@pytest.mark.parametrize("fidelity", ["fast", "balanced"])
+@pytest.mark.parametrize("fidelity", SPRINGS)
 @pytest.mark.parametrize(
     "shape", [Box((0.0025, 0.0025, 0.02)), Box((0.02, 0.02, 0.002)), Box((0.005, 0.005, 0.02))]
 )
 def test_what_is_thin_gains_no_energy_where_it_lands(shape, fidelity):
     """But for the 5e-5 by which a free rod's sways."""
     for restitution, friction in ((0.0, 0.01), (0.0, 0.5), (0.0, 2.0), (0.03, 0.5), (0.1, 0.01)):
-        assert energy_gain(grazing((shape,), restitution, friction, fidelity, 2000)) < 1e-4
+        count = 500 if fidelity == "accurate" else 2000
+        assert energy_gain(grazing((shape,), restitution, friction, fidelity, count)) < 1e-4
 
 
 @pytest.mark.parametrize("fidelity", SPRINGS)
@@ -296,7 +297,9 @@ def test_a_plate_that_lands_flat_rebounds_with_what_its_softness_leaves(fidelity
     position[:, 0, 2] += world.fidelity.substep * np.arange(phases) / phases
     world.set_state(position=position, linear_velocity=(0, 0, -1.0))
     world.advance(0.3)
-    np.testing.assert_allclose(world.linear_velocity[:, 0, 2], 0.0627, atol=1e-3)
+    softer = 1.0 - 0.4775  # than a cube of its mass
+    least = 0.24 * world.fidelity.contact_resolution * softer
+    np.testing.assert_allclose(world.linear_velocity[:, 0, 2], least, atol=1e-3)
 
 
 @pytest.mark.parametrize(("fidelity", "error"), [("fast", 0.03), ("balanced", 0.02),
