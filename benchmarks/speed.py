@@ -9,6 +9,7 @@ lowest and the highest ratio within a round.
 """
 
 import argparse
+import os
 import statistics
 import subprocess
 from collections.abc import Callable, Iterator
@@ -141,11 +142,14 @@ def mujoco_sides(task: str, worlds: int = 256) -> dict[str, Side]:
     return {PEER: roll, "MuJoCo: batch": step}
 
 
-def panda(python: Path) -> Side:
-    """Half a second of PandaPush-v3 a call, in a process and an environment of its own."""
-    script = Path(__file__).parent / "peers" / "panda_push.py"
+def elsewhere(command: list[str | Path], tree: Path | None = None) -> Side:
+    """A turn a call of a script that runs in a process, and if told in a source tree, of its own.
+
+    The script takes a turn for every line it reads, then prints "steps" and how many they were.
+    """
+    env = {**os.environ, "PYTHONPATH": str(tree)} if tree else None
     process = subprocess.Popen(
-        [str(python), str(script), "0.5"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        command, cwd=tree, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
 
     def turn() -> int:
@@ -153,12 +157,17 @@ def panda(python: Path) -> Side:
         assert process.stdout is not None
         process.stdin.write("go\n")
         process.stdin.flush()
-        for line in process.stdout:  # PyBullet prints of its own
+        for line in process.stdout:  # some engines print of their own
             if line.startswith("steps "):
                 return int(line.split()[1])
-        raise RuntimeError(f"{script.name} ended early; does {python} have panda-gym?")
+        raise RuntimeError(f"{' '.join(map(str, command))} ended early")
 
     return turn
+
+
+def panda(python: Path) -> Side:
+    """Half a second of PandaPush-v3 a call, in a process and an environment of its own."""
+    return elsewhere([python, Path(__file__).parent / "peers" / "panda_push.py", "0.5"])
 
 
 def beside_peers(task: str, panda_python: Path | None = None) -> Table:

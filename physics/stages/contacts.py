@@ -14,6 +14,7 @@ from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
+from physics.stages.leaps import make_leaps
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
@@ -243,6 +244,7 @@ def make_side(features, report):
     others = sphere or box or capsule or particles
     compound = features.compound
     begin_side = make_begin_side(features)
+    leaps = make_leaps(compound)
 
     @stage
     def side(model, state, work, rows, g, k, h):
@@ -265,6 +267,8 @@ def make_side(features, report):
             if compound and box and kind == BOX:
                 hide(model, k, candidate, seen)
             if box and kind == BOX:
+                if constants.sharp == 0:  # before the loop, which remembers the present faces
+                    leaps(slots, candidate, seen, constants, h)
                 box_loop(slots, candidate, seen, constants, h, out)
             if capsule and kind == CAPSULE:
                 capsule_loop(slots, candidate, seen, constants, h, out)
