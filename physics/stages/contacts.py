@@ -14,7 +14,7 @@ from physics.jit import LANES, at, kernel, stage
 from physics.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 from physics.stages.friction import friction_force, twist_torque, viscous_force
 from physics.stages.kinematics import turned
-from physics.stages.leaps import make_leaps
+from physics.stages.leaps import make_leaps, turned_by
 from physics.stages.normal_force import dashpot_force, overlap_force
 from physics.stages.parts import hide
 from physics.stages.relative import relative_motion, relative_pose
@@ -224,13 +224,6 @@ def make_loop(features, kind, report):
     return loop
 
 
-@stage
-def turned_by(jx, jy, jz, x, y, z, nx, ny, nz):
-    """1/kg that turning adds to a body's inverse mass at p from its centre: (p x n)^2 / J."""
-    mx, my, mz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
-    return jx * mx * mx + jy * my * my + jz * mz * mz
-
-
 @cache
 def make_side(features, report):
     """Kernel that works out one side, and the wrenches of it on its solids."""
@@ -267,7 +260,8 @@ def make_side(features, report):
             if compound and box and kind == BOX:
                 hide(model, k, candidate, seen)
             if box and kind == BOX:
-                if constants.sharp == 0:  # before the loop, which remembers the present faces
+                # a look has no step; the loop remembers the present faces, so this comes before
+                if constants.sharp == 0 and h > 0.0:
                     leaps(slots, candidate, seen, constants, h)
                 box_loop(slots, candidate, seen, constants, h, out)
             if capsule and kind == CAPSULE:

@@ -3,23 +3,31 @@
 A kick takes the normal at the present position for the whole step. That errs little while the
 normal turns little. But a ball that sinks so deep that its centre passes close by an edge of the
 box's core, or through it, is pressed by one face in one half of the step and by another in the
-other. With the half step s = h u / 2 of its centre as seen from the box, and overlaps d at the
-step's start, middle and end, the spring should do the work k/2 (d-^2 - d+^2), and does, along its
-normal n, k/2 ((d - s.n)^2 - (d + s.n)^2), no overlap counted below 0. (`normal_force` has the same
-mean over the drift.) Of what it does too much, a force against u takes back, at most until the
-centre rests. What it does too little is lost: energy may only fall by what a step doesn't resolve.
+other. With the half step s = h u / 2 of its centre as seen from the box, and overlaps d- d d+ at
+the step's start, middle and end, the spring should do the work k/2 (d-^2 - d+^2), and does, along
+its normal n, k/2 ((d + s.n)^2 - (d - s.n)^2), no overlap counted below 0. (`overlap_force` has the
+same mean over the drift.) On a flat face they are equal. Of what it does too much, a force against
+u takes back, at most until the centre rests. What it does too little is lost: energy only falls by
+what a step doesn't resolve. Capsules meet boxes likewise; boxes meet each other by faces alone.
 
-Without it, a ball of 1 cm gained up to 12 % against a rod of 5 mm at `fast`, of 6,000 such impacts
-at e = 0.95 in 20.
+The force acts at the ball's centre, and no report of contacts has it.
 """
 
+import math
 from functools import cache
 
-from physics.jit import LANES, at, stage
+from physics.jit import LANES, at, kernel, stage
 from physics.stages.surfaces import box_distance
 
 # half steps of the centre's way within which it is near the core: elsewhere nothing changes
 _NEAR = 8.0
+
+
+@stage
+def turned_by(jx, jy, jz, x, y, z, nx, ny, nz):
+    """1/kg that turning adds to a body's inverse mass at p from its centre: (p x n)^2 / J."""
+    mx, my, mz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+    return jx * mx * mx + jy * my * my + jz * mz * mz
 
 
 @stage
@@ -31,14 +39,15 @@ def _square(overlap):
 
 @cache
 def make_leaps(compound):
-    """Stage for the slots of a side that isn't `sharp`, in a scene with compounds or without."""
+    """Kernel for the slots of a side that isn't `sharp`, in a scene with compounds or without."""
 
-    @stage
+    @kernel
     def leaps(slots, candidate, seen, constants, h):
         R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
         force, torque = seen.force, seen.torque
-        radii, core, masses = constants.radius, constants.core, constants.pair_mass
-        stiffness = constants.stiffness
+        radii, core, stiffness = constants.radius, constants.core, constants.stiffness
+        pair_mass, yielding = constants.pair_mass, constants.yielding
+        centre = constants.surface_centre
         for n in range(slots):
             row = candidate[n]
             for i in range(LANES):
@@ -50,35 +59,48 @@ def make_leaps(compound):
                 sy = 0.5 * h * (v[1, i] + omega[2, i] * rx - omega[0, i] * rz)
                 sz = 0.5 * h * (v[2, i] + omega[0, i] * ry - omega[1, i] * rx)
                 px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
-                a, b, e = at(core[0], i), at(core[1], i), at(core[2], i)
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                radius, face, weight = at(radii, i), row.face[i], row.weight[i]
                 wx = wy = wz = 0.0
                 if compound:
                     wx, wy, wz = row.cover[0, i], row.cover[1, i], row.cover[2, i]
-                radius, face = at(radii, i), row.face[i]
-                start, _, _, _, _ = box_distance(
-                    px - sx, py - sy, pz - sz, a, b, e, face, radius, False, wx, wy, wz
-                )
+                start = box_distance(
+                    px - sx, py - sy, pz - sz, ca, cb, cc, face, radius, False, wx, wy, wz
+                )[0]
                 middle, nx, ny, nz, face = box_distance(
-                    px, py, pz, a, b, e, face, radius, False, wx, wy, wz
+                    px, py, pz, ca, cb, cc, face, radius, False, wx, wy, wz
                 )
-                end, _, _, _, _ = box_distance(
-                    px + sx, py + sy, pz + sz, a, b, e, face, radius, False, wx, wy, wz
-                )
-                along = sx * nx + sy * ny + sz * nz
-                done = _square(radius - middle - along) - _square(radius - middle + along)
-                excess = done - _square(radius - start) + _square(radius - end)
+                end = box_distance(
+                    px + sx, py + sy, pz + sz, ca, cb, cc, face, radius, False, wx, wy, wz
+                )[0]
+                d, along = radius - middle, sx * nx + sy * ny + sz * nz
+                due = _square(radius - start) - _square(radius - end)
+                excess = _square(d + along) - _square(d - along) - due
                 square = sx * sx + sy * sy + sz * sz
-                near = max(middle, 0.0) ** 2 < _NEAR * _NEAR * square
-                weight = row.weight[i]
-                acts = near & (middle < radius) & (excess > 0.0) & (weight > 0.0)
+                near = _square(middle) < _NEAR * _NEAR * square
+                acts = near & (d > 0.0) & (excess > 0.0) & (weight > 0.0)
                 if compound:
-                    acts &= max(wx, max(wy, wz)) < float("inf")
-                # k/2 excess = f |2 s|, of the force f along s; and f h = m |2 s| / h stops it
-                most = 2.0 * at(masses, i) / (h * h)
-                share = (
-                    min(0.25 * at(stiffness, i) * weight * excess / square, most) if acts else 0.0
+                    acts &= max(wx, max(wy, wz)) < math.inf  # hidden by another part
+                turning = turned_by(
+                    at(yielding[0], i),
+                    at(yielding[1], i),
+                    at(yielding[2], i),
+                    px - at(centre[0], i),
+                    py - at(centre[1], i),
+                    pz - at(centre[2], i),
+                    sx,
+                    sy,
+                    sz,
                 )
-                fx, fy, fz = -share * sx, -share * sy, -share * sz
+                # f |2 s| = k/2 excess, of a force f along s; f h = m |2 s| / h stops the centre
+                inverse_mass = square / at(pair_mass, i) + turning  # times |s|^2
+                taken = min(
+                    0.25 * at(stiffness, i) * excess, 2.0 * square * square / (h * h * inverse_mass)
+                )
+                share = weight * taken / square
+                fx = -share * sx if acts else 0.0
+                fy = -share * sy if acts else 0.0
+                fz = -share * sz if acts else 0.0
                 force[0, i] += fx
                 force[1, i] += fy
                 force[2, i] += fz
