@@ -1,8 +1,9 @@
-"""Push's speed at this commit beside other commits: python -m benchmarks.commits COMMIT ...
+"""Push's speed in this tree beside other commits: python -m benchmarks.commits COMMIT ...
 
-Each commit is unpacked into a folder of its own and runs in a process of its own, with the packages
-that are installed here; processes take turns of an episode of 4,096 worlds at balanced. What a
-machine does meanwhile hits all sides alike, so differences of a percent show after a minute.
+Each commit is unpacked into a folder of its own, compiled there, and runs in a process of its own
+with the packages that are installed here; processes take turns of an episode of 4,096 worlds at
+balanced. What a machine does meanwhile hits all sides alike, so differences of a few percent show
+after two minutes.
 """
 
 import argparse
@@ -13,20 +14,19 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.report import ROOT, THREADS, Table, against, main, take_turns
-from benchmarks.speed import elsewhere
+from benchmarks.report import ROOT, THREADS, Table, against, elsewhere, main, take_turns
 
 ROUNDS, SECONDS = 120, 0.01  # an episode takes longer, so a turn is one
+HERE = "this tree"
 SCRIPT = Path(__file__).parent / "peers" / "push.py"
 
 
-def unpacked(commit: str, folder: Path) -> Path:
-    """The tree of a commit, in a folder named after it."""
-    tree = folder / commit
-    tree.mkdir()
+def unpack(commit: str, tree: Path) -> Path:
+    """Puts the files of a commit into a new folder."""
     archive = subprocess.run(["git", "archive", commit], cwd=ROOT, capture_output=True)
     if archive.returncode:
         raise SystemExit(f"{commit!r} can't be had from {ROOT}: {archive.stderr.decode().strip()}")
+    tree.mkdir()
     subprocess.run(["tar", "-x", "-C", tree], input=archive.stdout, check=True)
     return tree
 
@@ -34,7 +34,8 @@ def unpacked(commit: str, folder: Path) -> Path:
 def measure(commits: list[str], threads: int) -> Iterator[Table]:
     """One table: this tree and each commit, ratios to the first commit named."""
     with TemporaryDirectory() as folder:
-        trees = {"here": ROOT, **{commit: unpacked(commit, Path(folder)) for commit in commits}}
+        places = {commit: Path(folder) / str(n) for n, commit in enumerate(commits)}
+        trees = {HERE: ROOT} | {commit: unpack(commit, at) for commit, at in places.items()}
         sides = {
             name: elsewhere([sys.executable, SCRIPT, str(threads)], tree)
             for name, tree in trees.items()
@@ -50,4 +51,4 @@ if __name__ == "__main__":
     parser.add_argument("commits", nargs="+", metavar="COMMIT")
     parser.add_argument("--threads", type=int, default=THREADS)
     words = parser.parse_args()
-    main(__doc__, partial(measure, words.commits, words.threads))
+    main(__doc__, partial(measure, list(dict.fromkeys(words.commits)), words.threads))

@@ -20,6 +20,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("numpy", "numba", "gymnasium", "mujoco")
 
 Cell = str | float | None
+Side = Callable[[], int]
 
 
 class Table(NamedTuple):
@@ -120,7 +121,7 @@ def main(doc: str | None, measure: Callable[[], Iterator[Table]]) -> None:
         print(plain(table) + "\n", flush=True)
 
 
-def rate(side: Callable[[], int], seconds: float) -> float:
+def rate(side: Side, seconds: float) -> float:
     """Units a second of a side that does some work and returns how many units it was."""
     done, start = 0, perf_counter()
     while (spent := perf_counter() - start) < seconds:
@@ -128,9 +129,7 @@ def rate(side: Callable[[], int], seconds: float) -> float:
     return done / spent
 
 
-def take_turns(
-    sides: Mapping[str, Callable[[], int]], rounds: int, seconds: float
-) -> dict[str, list[float]]:
+def take_turns(sides: Mapping[str, Side], rounds: int, seconds: float) -> dict[str, list[float]]:
     """Units a second of each side in each round; all sides have had a turn before the first."""
     for side in sides.values():
         side()
@@ -149,6 +148,30 @@ def against(rates: dict[str, list[float]], peer: str) -> list[list[Cell]]:
         ratio = statistics.median(mine) / statistics.median(rates[peer])
         rows.append([name, statistics.median(mine), ratio, min(ratios), max(ratios)])
     return rows
+
+
+def elsewhere(command: list[str | Path], tree: Path | None = None) -> Side:
+    """A turn a call of a script that runs in a process of its own, and on the packages of a tree.
+
+    For every line it reads the script takes a turn, then prints "steps" and how many they were. It
+    ends when there are no more lines, so with this process.
+    """
+    env = {**os.environ, "PYTHONPATH": str(tree)} if tree else None
+    process = subprocess.Popen(
+        command, cwd=tree, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+
+    def turn() -> int:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+        for line in process.stdout:  # some engines print of their own
+            if line.startswith("steps "):
+                return int(line.split()[1])
+        raise RuntimeError(f"{' '.join(map(str, command))} ended early")
+
+    return turn
 
 
 @contextmanager

@@ -9,10 +9,8 @@ lowest and the highest ratio within a round.
 """
 
 import argparse
-import os
 import statistics
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -23,7 +21,18 @@ from mujoco import MjData, mjtState, rollout
 from mujoco.batch import Batch
 
 from benchmarks.mujoco_scene import model_of
-from benchmarks.report import THREADS, Cell, Table, against, clocked, main, rate, take_turns
+from benchmarks.report import (
+    THREADS,
+    Cell,
+    Side,
+    Table,
+    against,
+    clocked,
+    elsewhere,
+    main,
+    rate,
+    take_turns,
+)
 from physics import PRESETS, World
 from rigid_envs import Runner
 from rigid_envs.tasks import TASKS, Push
@@ -42,7 +51,6 @@ PEER = "MuJoCo: rollout"
 ROUNDS, SECONDS = 5, 2.0
 
 Array = np.ndarray
-Side = Callable[[], int]
 
 
 def id_of(task: str) -> str:
@@ -140,29 +148,6 @@ def mujoco_sides(task: str, worlds: int = 256) -> dict[str, Side]:
         return worlds * EPISODE
 
     return {PEER: roll, "MuJoCo: batch": step}
-
-
-def elsewhere(command: list[str | Path], tree: Path | None = None) -> Side:
-    """A turn a call of a script that runs in a process, and if told in a source tree, of its own.
-
-    The script takes a turn for every line it reads, then prints "steps" and how many they were.
-    """
-    env = {**os.environ, "PYTHONPATH": str(tree)} if tree else None
-    process = subprocess.Popen(
-        command, cwd=tree, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-
-    def turn() -> int:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        process.stdin.write("go\n")
-        process.stdin.flush()
-        for line in process.stdout:  # some engines print of their own
-            if line.startswith("steps "):
-                return int(line.split()[1])
-        raise RuntimeError(f"{' '.join(map(str, command))} ended early")
-
-    return turn
 
 
 def panda(python: Path) -> Side:

@@ -6,17 +6,18 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 
-import physics
-import rigid_envs  # noqa: F401  registers the environments
+import rigid_envs
 
-# an installed copy would be measured for the commit whose tree this is run in
-assert Path(physics.__file__).parent.parent == Path.cwd(), physics.__file__
 WORLDS, EPISODE = 4096, 50
 
+tree = Path(rigid_envs.__file__).resolve().parent.parent
+if tree != Path.cwd().resolve():  # an installed copy
+    sys.exit(f"rigid_envs is that of {tree}, should be that of {Path.cwd()}")
 envs = gym.make_vec(
     "RigidEnvs/Push-v0",
     num_envs=WORLDS,
     reward_type="dense",
+    fidelity="balanced",
     threads=int(sys.argv[1]),
     max_episode_steps=EPISODE,
 )
