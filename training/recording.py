@@ -140,7 +140,7 @@ def _check_place(
             if (own := config.as_mapping()[name]) != value:
                 raise UsageError(
                     f"its {name} is {own}, but {place}, of the same table, has {value}; runs of a "
-                    "table differ by their seed alone"
+                    "table differ by their seed alone; delete its folders to begin it anew"
                 )
         if again:
             raise UsageError(
