@@ -75,7 +75,7 @@ def record_run(
         "fidelity": config.last_env_kwargs.get("fidelity"),
         "success_at_end": _share(outcome.success_at_end),
         "success_at_any_time": _share(outcome.success_at_any_time),
-        "command": _command(config),
+        "command": _command(config) + _threads(run),
         "commit": run.get("git_commit"),
         "resumed": len(resumed) if isinstance(resumed, list) else resumed,
         "started": run.get("started"),
@@ -169,6 +169,17 @@ def _command(config: TrainConfig) -> str:
         pass
     task = task_name(config.env_id, config.last_env_kwargs)
     return f"{words} --config results/{config.algo}/{task}_seed{config.seed}/config.yaml"
+
+
+def _threads(run: dict[str, Any]) -> str:
+    """The threads of torch that a run was told: with others its sums, and so its policy, differ."""
+    words = run.get("command")
+    told = [str(word) for word in words] if isinstance(words, list) else []
+    for word, after in zip(told, [*told[1:], ""], strict=True):
+        name, _, value = word.partition("=")
+        if name == "--num-threads":
+            return f" --num-threads {value or after}"
+    return ""
 
 
 def _write(result: Result, folder: RunFolder, config: TrainConfig, repository: Path) -> None:

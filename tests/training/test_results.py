@@ -306,6 +306,14 @@ def test_the_command_is_the_shortest_that_trains_the_same():
     )
 
 
+@pytest.mark.parametrize("told", [["--num-threads", "1"], ["--num-threads=1"]])
+def test_the_command_says_how_many_threads_a_run_was_told(repository, runs, told):
+    first = sorted((runs / "ppo").iterdir())[0]
+    change(first / "run.json", command=["rigid-envs", "train", *told, "--seed", "3"])
+    update(repository, first)
+    assert read_results(repository)[0].command.endswith("--num-threads 1")
+
+
 def test_a_long_learning_curve_is_thinned_to_its_ends(repository, runs):
     run = runs / "ppo" / "Test-Reach-v0_1"
     header = "rollout/success_rate,time/total_timesteps,time/wall_time,train/loss\n"
