@@ -291,7 +291,7 @@ def test_what_is_thin_gains_no_energy_where_it_lands(shape, fidelity):
 @pytest.mark.parametrize("rod", [Box((0.0025, 0.0025, 0.02)), Box((0.005, 0.005, 0.02))])
 def test_a_small_ball_gains_no_energy_from_a_rod(rod, fidelity):
     """At 1 m/s its centre passes through the rod's core, and its normal leaps from face to face."""
-    most = 1e-3 if fidelity == "fast" else 1e-4  # steps of 2.9 mm, and one of 0.25
+    most = 1e-3 if fidelity == "fast" else 1e-4  # a step at fast is 2.9 mm of its way
     for friction in (0.01, 0.5):
         count = 500 if fidelity == "accurate" else 2000
         world = grazing((Sphere(0.005), rod), 0.95, friction, fidelity, count)
