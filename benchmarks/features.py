@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 from benchmarks.report import Cell, Table, main, take_turns
 from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
-from physics.scene import Static, Vector
+from physics.scene.scene import Static, Vector
 
 WORLDS = 1024
 FRAME = 0.04  # s

@@ -15,7 +15,7 @@ except ModuleNotFoundError:
 
 from physics import Body, Box, Capsule, Drive, Ground, Scene, Sphere, Static
 from physics.rotation import rotate, rotate_back
-from physics.shapes import Shape
+from physics.scene.shapes import Shape
 
 Array = np.ndarray
 

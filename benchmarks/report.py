@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from physics.schedule import default_threads
+from physics.step.threads import default_threads
 
 THREADS = 2  # of both sides, wherever threads are used
 ROOT = Path(__file__).parent.parent

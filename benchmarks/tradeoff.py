@@ -29,7 +29,7 @@ from physics.reference.measures import (
     stand,
 )
 from physics.reference.scenes import CUBE, tower
-from physics.validation import positive
+from physics.scene.validation import positive
 
 TOWERS = (5, 10)
 TIME = 10.0  # s

@@ -4,17 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from physics import diagnostics, stability
-from physics.diagnostics import Contacts
-from physics.features import ISOTROPIC, Features
-from physics.fidelity import Fidelity
+from physics.analysis import diagnostics, stability
+from physics.analysis.diagnostics import Contacts
 from physics.jit import LANES
-from physics.model import Model
-from physics.readout import Readout
+from physics.model.features import ISOTROPIC, Features
+from physics.model.state import State
+from physics.model.tables import Model
 from physics.rotation import rotate, rotate_back
-from physics.scene import Scene
-from physics.state import State
-from physics.validation import integer
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Scene
+from physics.scene.validation import integer
+from physics.step.readout import Readout
 
 Array = np.ndarray
 

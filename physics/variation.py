@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from physics.features import Features
-from physics.fidelity import Fidelity
-from physics.layout import Layout
-from physics.limits import check_range, check_world
-from physics.model import Model, vary
-from physics.parameters import Parameters, check_ranges, check_values
+from physics.analysis.step_limits import check_range, check_world
+from physics.model.build import vary
+from physics.model.features import Features
+from physics.model.pairs import Layout
+from physics.model.tables import Model
 from physics.readings import Readings
 from physics.rotation import rotate, rotate_back
-from physics.scene import Scene
+from physics.scene.fidelity import Fidelity
+from physics.scene.parameters import Parameters, check_ranges, check_values
+from physics.scene.scene import Scene
 
 Array = np.ndarray
 

@@ -5,23 +5,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.clock import cut, make_advance
-from physics.commands import by_worlds, make_command, make_lead
+from physics.analysis.step_limits import cause_of_divergence, check_step
 from physics.errors import ContactOverflow, SimulationDiverged
-from physics.features import NO_ROTATION
-from physics.fidelity import Fidelity, resolve
-from physics.group import Work
 from physics.jit import LANES, columns
-from physics.layout import Layout
-from physics.limits import cause_of_divergence, check_step
-from physics.model import Model, build, spread
-from physics.parameters import Parameters, with_parameters
-from physics.readout import WIDTH, make_readout
-from physics.scene import Body, Drive, Scene
-from physics.schedule import check_threads, share_out
-from physics.state import FIRST_TOUCH, MOVING, PRESSED, State, allocate
-from physics.state import copy as copy_state
-from physics.validation import array, instance, integer, positive
+from physics.model.build import build, spread
+from physics.model.features import NO_ROTATION
+from physics.model.pairs import Layout
+from physics.model.state import FIRST_TOUCH, MOVING, PRESSED, State, allocate
+from physics.model.state import copy as copy_state
+from physics.model.tables import Model
+from physics.model.workspace import Work
+from physics.motion.drive_commands import by_worlds, make_command, make_lead
+from physics.scene.fidelity import Fidelity, resolve
+from physics.scene.parameters import Parameters, with_parameters
+from physics.scene.scene import Body, Drive, Scene
+from physics.scene.validation import array, instance, integer, positive
+from physics.step.readout import WIDTH, make_readout
+from physics.step.threads import check_threads, share_out
+from physics.step.time_layers import cut, make_advance
 from physics.variation import Variation, spin_momentum
 
 Array = np.ndarray
@@ -50,7 +51,7 @@ class World(Variation):
 
     Raises:
         TypeError, ValueError: a bad argument; a step that is too long for the scene, see
-            `physics.limits.check_step`.
+            `physics.analysis.step_limits.check_step`.
     """
 
     def __init__(

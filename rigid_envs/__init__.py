@@ -1,8 +1,8 @@
 """Gymnasium environments on the particle-based rigid-body engine of `physics`."""
 
 from rigid_envs.env import RigidEnv
+from rigid_envs.episodes.runner import Runner
 from rigid_envs.registration import register
-from rigid_envs.runner import Runner
 from rigid_envs.tasks import Task
 from rigid_envs.vector_env import RigidVectorEnv
 

@@ -6,11 +6,11 @@ import gymnasium as gym
 import numpy as np
 
 from physics import Fidelity
-from rigid_envs.arguments import make_task, words
-from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
-from rigid_envs.rewards import Reward
-from rigid_envs.runner import Observation, Runner, check_seed
+from rigid_envs.episodes.arguments import make_task, words
+from rigid_envs.episodes.runner import Observation, Runner, check_seed
+from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
+from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
 
@@ -29,7 +29,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
         terminate_on_success: end an episode when it is solved.
         randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
-            see `rigid_envs.randomization.Randomization`.
+            see `rigid_envs.episodes.randomization.Randomization`.
         observe_parameters: what `randomize` names is observed too.
         guided: what is left to do is observed too, as the task tells it from both goals. Not for
             learners that relabel goals (HER): they would read the goal that was.
@@ -134,7 +134,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+        """The reward of goals [..., goal]; see `rigid_envs.tasks.rewards.Reward.compute`.
 
         Raises:
             ValueError: with the dense reward, other goals than those of the info's step.

@@ -8,12 +8,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from physics import Fidelity
-from physics.validation import choice, integer
-from rigid_envs.arguments import make_task, words
-from rigid_envs.pictures import FPS, RENDER_MODES, Pictures
-from rigid_envs.rewards import Reward
-from rigid_envs.runner import Observation, Runner, check_seed
+from physics.scene.validation import choice, integer
+from rigid_envs.episodes.arguments import make_task, words
+from rigid_envs.episodes.runner import Observation, Runner, check_seed
+from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
+from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
 
@@ -36,7 +36,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         max_episode_steps: truncate after so many steps; never if None.
         terminate_on_success: end an episode when it is solved.
         randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
-            see `rigid_envs.randomization.Randomization`.
+            see `rigid_envs.episodes.randomization.Randomization`.
         observe_parameters: what `randomize` names is observed too.
         guided: what is left to do is observed too, as the task tells it from both goals. Not for
             learners that relabel goals (HER): they would read the goal that was.
@@ -205,7 +205,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., goal]; see `rigid_envs.rewards.Reward.compute`.
+        """The reward of goals [..., goal]; see `rigid_envs.tasks.rewards.Reward.compute`.
 
         Raises:
             ValueError: with the dense reward, other goals than those of the info's step.
@@ -216,8 +216,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     def render(self) -> tuple[Array, ...] | None:
         """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them as a grid.
 
-        At most `render_worlds` are drawn. `rigid_envs.rendering.grid` makes one picture of several
-        frames.
+        At most `render_worlds` are drawn. `rigid_envs.rendering.renderer.grid` makes one
+        picture of several frames.
         """
         if self.render_mode is None:
             gym.logger.warn('render() needs gym.make_vec(..., render_mode="rgb_array") or "human"')

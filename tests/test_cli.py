@@ -5,14 +5,14 @@ import sys
 
 import pytest
 
-from training import cli
+from training.commands import cli
 
 COMMANDS = ("train", "evaluate", "record", "scripted", "plot", "tune", "demo")
 
 
 def test_starts_without_stable_baselines3_and_torch():
     code = (
-        "import sys, training.cli\n"
+        "import sys, training.commands.cli\n"
         "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'imageio', 'yaml', 'rich'}\n"
         "sys.exit(repr(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)"
     )

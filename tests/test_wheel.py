@@ -55,4 +55,4 @@ def test_wheel_holds_nothing_else(wheel):
 
 def test_wheel_installs_the_command(wheel):
     (entry_points,) = [n for n in wheel.namelist() if n.endswith("entry_points.txt")]
-    assert "rigid-envs = training.cli:main" in wheel.read(entry_points).decode()
+    assert "rigid-envs = training.commands.cli:main" in wheel.read(entry_points).decode()

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from physics.fidelity import Fidelity
 from physics.reference import closed_forms
 from physics.reference.scenes import (
     CUBE,
@@ -20,8 +19,9 @@ from physics.reference.scenes import (
     sphere_on_ground,
     tower,
 )
-from physics.scene import Body, Ground, Material, Scene
-from physics.shapes import Shape
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Body, Ground, Material, Scene
+from physics.scene.shapes import Shape
 from physics.world import World
 
 Array = np.ndarray

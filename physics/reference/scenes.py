@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from physics.fidelity import Fidelity
-from physics.scene import Body, Drive, Ground, Material, Scene, Vector
-from physics.shapes import Box, Capsule, Shape, Sphere
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Body, Drive, Ground, Material, Scene, Vector
+from physics.scene.shapes import Box, Capsule, Shape, Sphere
 from physics.world import World
 
 GRAVITY = 9.81  # m/s^2

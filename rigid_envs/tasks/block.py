@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics import Box, Compound
-from physics.validation import choice, instance
+from physics.scene.validation import choice, instance
 
 Array = np.ndarray
 

@@ -17,12 +17,12 @@ from physics import (
     Static,
     World,
 )
-from physics.validation import instance, integer
-from rigid_envs.camera import Camera
-from rigid_envs.rewards import Reward, distance
+from physics.scene.validation import instance, integer
+from rigid_envs.rendering.camera import Camera
+from rigid_envs.rendering.view import Goal, Sign
 from rigid_envs.tasks.block import HALF, Block
+from rigid_envs.tasks.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
-from rigid_envs.view import Goal, Sign
 
 Array = np.ndarray
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from physics import Body, Box, Fidelity, Ground, Material, Readout, Scene, World
-from physics.validation import integer, number
-from rigid_envs.camera import Camera
-from rigid_envs.rewards import Reward, distance
+from physics.scene.validation import integer, number
+from rigid_envs.rendering.camera import Camera
+from rigid_envs.rendering.view import BODY_COLORS, Ghost, Sign
 from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
-from rigid_envs.view import BODY_COLORS, Ghost, Sign
 
 Array = np.ndarray
 

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Readout, Scene, World
-from rigid_envs.camera import Camera
-from rigid_envs.rewards import Reward
-from rigid_envs.view import Goal, Sign
+from rigid_envs.rendering.camera import Camera
+from rigid_envs.rendering.view import Goal, Sign
+from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
 

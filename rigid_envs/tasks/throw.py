@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics import Body, Fidelity, Ground, Material, Readout, Scene, Sphere, World
-from rigid_envs.camera import Camera
-from rigid_envs.rewards import Reward, distance
+from rigid_envs.rendering.camera import Camera
+from rigid_envs.rendering.view import Goal, Mark, Sign
 from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
-from rigid_envs.view import Goal, Mark, Sign
 
 Array = np.ndarray
 

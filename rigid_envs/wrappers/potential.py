@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.validation import array, number
-from rigid_envs.goals import distance
+from physics.scene.validation import array, number
+from rigid_envs.tasks.goals import distance
 from rigid_envs.wrappers.rule import Goals, Observation, Rule, Terms, Transition
 
 Array = np.ndarray

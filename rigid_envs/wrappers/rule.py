@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rigid_envs.goals import distance
-from rigid_envs.rewards import Reward
+from rigid_envs.tasks.goals import distance
+from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
 Observation = Mapping[str, Array]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.validation import number, positive
+from physics.scene.validation import number, positive
 from rigid_envs.wrappers.rule import Goals, Observation, Rule, Terms, Transition
 
 Array = np.ndarray

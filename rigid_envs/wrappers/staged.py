@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from physics.validation import instance, number, positive
-from rigid_envs.rewards import OF_GOALS
+from physics.scene.validation import instance, number, positive
+from rigid_envs.tasks.rewards import OF_GOALS
 from rigid_envs.wrappers.rule import Goals, Rule, Terms
 
 Array = np.ndarray

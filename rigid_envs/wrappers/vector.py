@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
-from rigid_envs.rewards import GOALS_OF_TERMS
+from rigid_envs.tasks.rewards import GOALS_OF_TERMS
 from rigid_envs.wrappers import potential, rules, staged
 from rigid_envs.wrappers.rule import Transition
 from rigid_envs.wrappers.wrapping import Wrapping

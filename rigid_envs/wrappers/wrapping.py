@@ -11,7 +11,7 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv, VectorRewardWrapper, VectorWrapper
 from gymnasium.wrappers.vector import NormalizeReward as VectorNormalizeReward
 
-from rigid_envs.rewards import GOALS_OF_TERMS, Reward, column, goals_of_terms
+from rigid_envs.tasks.rewards import GOALS_OF_TERMS, Reward, column, goals_of_terms
 from rigid_envs.wrappers.rule import Goals, Rule, Terms, Transition
 
 Array = np.ndarray
@@ -74,7 +74,7 @@ class Wrapping:
         if rule.judges and self._reward is None:
             raise TypeError(
                 f"{name} asks the environment when a goal is reached: its attribute `reward` must "
-                f"be a rigid_envs.rewards.Reward, which {_shown(env)} has not"
+                f"be a rigid_envs.tasks.rewards.Reward, which {_shown(env)} has not"
             )
         # a second wrapper of the same rule numbers its terms, lest it overwrite the first's
         same = sum(

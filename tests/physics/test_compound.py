@@ -9,8 +9,8 @@ import pytest
 
 from physics import Body, Box, Capsule, Compound, Fidelity, Ground, Part, Scene, Sphere, World
 from physics.rotation import from_rotation_vector
-from physics.seams import covers
-from physics.shapes import Shape
+from physics.scene.internal_faces import covers
+from physics.scene.shapes import Shape
 
 BAR, STEM = Box((0.04, 0.01, 0.015)), Box((0.01, 0.02, 0.015))
 T = Compound([(BAR, (0.3, 0.01, 0.2)), (STEM, (0.3, -0.02, 0.2))])

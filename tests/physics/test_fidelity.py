@@ -6,7 +6,7 @@ import math
 import pytest
 
 from physics import PRESETS, Fidelity
-from physics.fidelity import resolve
+from physics.scene.fidelity import resolve
 
 LIMITS = {"contact_resolution": 0.7, "spacing": 1.0, "rounding": 0.5, "skin": 1.0}
 

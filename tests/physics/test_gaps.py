@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from physics import Body, Box, Capsule, Compound, Ground, Scene, Sphere
-from physics.fidelity import PRESETS
-from physics.model import build
+from physics.collision.separations import gap_along_axes, make_measure
+from physics.model.build import build
 from physics.rotation import rotation_matrix
-from physics.stages.gaps import gap_along_axes, make_measure
+from physics.scene.fidelity import PRESETS
 
 BOX, BALL, ROD = Box((0.03, 0.02, 0.01)), Sphere(0.02), Capsule(0.01, 0.03)
 T = Compound([(Box((0.04, 0.01, 0.015)), (0, 0, 0)), (Box((0.01, 0.02, 0.015)), (0, -0.03, 0))])

@@ -19,7 +19,7 @@ ROOT = PACKAGE.parent
 # a ball in free flight needs the fewest stages
 FALL = """
 from physics import Body, Scene, Sphere, World
-from physics.clock import make_advance
+from physics.step.time_layers import make_advance
 from physics.jit import telling
 names = []
 with telling(names.append):
@@ -114,7 +114,7 @@ def test_every_entry_point_carries_the_key_of_the_cache():
         found += entries
     assert found >= 2
     world = World(scenes.push_like())
-    from physics.clock import make_advance
+    from physics.step.time_layers import make_advance
 
     function = make_advance(world.features).compiled.py_func
     cells = [c.cell_contents for c in function.__closure__]

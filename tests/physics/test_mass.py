@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from physics import mass
-from physics.shapes import Box, Capsule, Sphere
+from physics.scene import mass
+from physics.scene.shapes import Box, Capsule, Sphere
 
 SOLIDS = {
     "sphere": (Sphere(0.3), lambda p: np.sum(p**2, axis=-1) < 0.09),

@@ -23,9 +23,9 @@ from physics import (
     World,
 )
 from physics.jit import LANES
-from physics.parameters import with_parameters
 from physics.reference import scenes
 from physics.reference.scenes import GRAVITY
+from physics.scene.parameters import with_parameters
 from tests.physics.bystanders import with_bystanders
 from tests.physics.test_world import digests
 

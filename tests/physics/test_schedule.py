@@ -7,7 +7,7 @@ import pytest
 
 from physics import World
 from physics.reference import scenes
-from physics.schedule import check_threads, default_threads, share_out
+from physics.step.threads import check_threads, default_threads, share_out
 
 
 @pytest.mark.parametrize("count", [1, 63, 64, 65, 1000, 4096])

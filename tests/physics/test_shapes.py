@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from physics.shapes import Box, Capsule, Shape, Sphere
-from physics.stages.surfaces import box_distance, capsule_distance, sphere_distance
+from physics.collision.distances import box_distance, capsule_distance, sphere_distance
+from physics.scene.shapes import Box, Capsule, Shape, Sphere
 
 BOXES = [Box((0.02, 0.02, 0.02)), Box((0.02, 0.03, 0.07)), Box((0.1, 0.1, 0.004))]
 SPACINGS = [1.0, 0.5, 0.25]

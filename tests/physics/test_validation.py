@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from physics import validation
+from physics.scene import validation
 
 
 @pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int64(2), np.float64(2)])

@@ -19,11 +19,11 @@ from physics import (
     Sphere,
     World,
 )
-from physics.features import GENERAL, ISOTROPIC, NO_ROTATION
 from physics.jit import LANES
+from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
+from physics.model.state import candidate_dtype
 from physics.reference import scenes
 from physics.reference.scenes import BALL, GRAVITY, settled
-from physics.state import candidate_dtype
 
 
 def thrown(count, threads=None, order=slice(None)):

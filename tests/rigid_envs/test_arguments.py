@@ -7,7 +7,7 @@ import gymnasium as gym
 import pytest
 
 from rigid_envs import RigidEnv, RigidVectorEnv, Runner
-from rigid_envs.arguments import OF_SINGLES, OF_VECTORS, words
+from rigid_envs.episodes.arguments import OF_SINGLES, OF_VECTORS, words
 from rigid_envs.tasks import Push
 from tests.rigid_envs.rollout import IDS, PUSH, STACK, make, make_vec
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigid_envs.draws import uniform
+from rigid_envs.episodes.draws import uniform
 
 N = 20_000
 SEEDS = np.arange(N)

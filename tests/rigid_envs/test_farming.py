@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigid_envs.goals import distance
 from rigid_envs.tasks import push, throw
+from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.stack import HALF, THRESHOLD, Stack
 from rigid_envs.wrappers import Stage, goal_potential
 from rigid_envs.wrappers.vector import (

@@ -15,10 +15,10 @@ from gymnasium.wrappers import RecordVideo
 from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
 from physics import World
-from rigid_envs import scene_view
-from rigid_envs.rendering import Mark, grid
+from rigid_envs.rendering import scene_view
+from rigid_envs.rendering.renderer import Mark, grid
+from rigid_envs.rendering.view import BODY_COLORS
 from rigid_envs.tasks import Push, Stack, Throw, push
-from rigid_envs.view import BODY_COLORS
 from tests.rigid_envs.rollout import (
     IDS,
     PUSH,

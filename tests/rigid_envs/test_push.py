@@ -6,8 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rigid_envs.draws import uniform
-from rigid_envs.rewards import distance
+from rigid_envs.episodes.draws import uniform
 from rigid_envs.tasks.push import (
     ARM,
     CLEAR,
@@ -20,6 +19,7 @@ from rigid_envs.tasks.push import (
     Push,
     heading,
 )
+from rigid_envs.tasks.rewards import distance
 from tests.rigid_envs.rollout import (
     EPISODE,
     PRESETS,

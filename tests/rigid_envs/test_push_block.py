@@ -8,11 +8,11 @@ import pytest
 
 from physics import Box, Capsule, Compound, Sphere
 from physics.rotation import from_yaw, rotate
-from rigid_envs import scene_view
-from rigid_envs.rendering import Renderer
-from rigid_envs.rewards import distance
+from rigid_envs.rendering import scene_view
+from rigid_envs.rendering.renderer import Renderer
 from rigid_envs.tasks.block import BAR, HALF, STEM, Block
 from rigid_envs.tasks.push import MASS, POST_RADIUS, POSTS, RANGE, THRESHOLD
+from rigid_envs.tasks.rewards import distance
 from tests.rigid_envs.rollout import EPISODE, assert_same, make, make_vec, random_actions, steps_of
 from training.scripted.push import push
 

@@ -10,9 +10,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import rigid_envs  # noqa: F401
-from rigid_envs import scene_view
-from rigid_envs.draws import normal, uniform
-from rigid_envs.runner import Runner
+from rigid_envs.episodes.draws import normal, uniform
+from rigid_envs.episodes.runner import Runner
+from rigid_envs.rendering import scene_view
 from rigid_envs.tasks import Push
 from training.scripted import CONTROLLERS
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from physics.shapes import Box, Capsule, Sphere
-from rigid_envs.rendering import (
+from physics.scene.shapes import Box, Capsule, Sphere
+from rigid_envs.rendering.renderer import (
     TO_LIGHT,
     Arrow,
     Camera,
@@ -300,7 +300,7 @@ def test_off_screen_frames_need_no_display_and_leave_the_environment_alone():
     program = """
 import os
 before = dict(os.environ)
-from rigid_envs.rendering import Goal, Renderer
+from rigid_envs.rendering.renderer import Goal, Renderer
 renderer = Renderer(32, 24)
 assert renderer.frame([], signs=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
 import pygame

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigid_envs.rewards import Reward, distance
+from rigid_envs.tasks.rewards import Reward, distance
 from tests.rigid_envs.rollout import (
     IDS,
     PUSH,

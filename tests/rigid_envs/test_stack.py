@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigid_envs.rewards import distance
+from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.stack import ASIDE, CELL, HALF, HIGHER, JITTER, THRESHOLD, Stack, _way
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS

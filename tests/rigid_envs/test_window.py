@@ -8,7 +8,7 @@ import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from rigid_envs.window import Key, NoDisplay, Window
+from rigid_envs.rendering.window import Key, NoDisplay, Window
 
 PICTURE = np.zeros((48, 64, 3), np.uint8)
 

@@ -12,8 +12,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from rigid_envs import wrappers
-from rigid_envs.goals import distance
 from rigid_envs.registration import ENVIRONMENTS
+from rigid_envs.tasks.goals import distance
 from rigid_envs.wrappers import Stage, goal_potential
 from tests.rigid_envs.rollout import (
     EPISODE,

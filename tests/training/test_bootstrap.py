@@ -4,8 +4,8 @@ import torch
 from stable_baselines3 import PPO
 
 from tests.training.reach import ReachVectorEnv
-from training.bootstrap import BatchedTimeoutBootstrap
-from training.vec_env import RigidVecEnv
+from training.sb3.bootstrap import BatchedTimeoutBootstrap
+from training.sb3.vec_env import RigidVecEnv
 
 
 def rewards_of_a_rollout(callback, **env_kwargs) -> np.ndarray:

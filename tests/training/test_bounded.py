@@ -7,11 +7,11 @@ import torch
 from stable_baselines3 import PPO
 
 from tests.training.reach import ReachVectorEnv
-from training.bounded import BoundedPolicy
-from training.config import BOUNDED
-from training.errors import UsageError
-from training.train import train
-from training.vec_env import RigidVecEnv
+from training.policies.bounded import BoundedPolicy
+from training.sb3.train import train
+from training.sb3.vec_env import RigidVecEnv
+from training.settings.config import BOUNDED
+from training.settings.errors import UsageError
 
 LEAST = 0.2
 

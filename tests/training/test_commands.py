@@ -3,8 +3,8 @@
 import pytest
 
 from tests.training.reach import straight_to_the_goal
-from training import cli
-from training.policy import CONTROLLERS
+from training.commands import cli
+from training.policies.policy import CONTROLLERS
 from training.scripted.push import push
 
 PUSH = "RigidEnvs/Push-v0"
@@ -79,7 +79,7 @@ def test_command_line_goes_over_the_file(reach, tmp_path, quick_ppo, write_yaml,
     words = ["train", "--env", reach, "-f", str(tmp_path), "--config", str(config), "--seed", "8"]
     words += ["-n", "80", "--hyperparams", "gamma:0.9", "--env-kwargs", "max_episode_steps:5"]
     assert cli.main([*words, "--fidelity", "fast"]) == 0
-    from training.run_folder import latest_run
+    from training.runs.run_folder import latest_run
 
     config = latest_run(tmp_path, "ppo", reach).config()
     assert (config.seed, config.n_timesteps, config.gamma) == (8, 80, 0.9)

@@ -2,8 +2,8 @@ import dataclasses
 
 import pytest
 
-from training.config import ALGORITHMS, PPOConfig, load_config
-from training.errors import UsageError, nearest
+from training.settings.config import ALGORITHMS, PPOConfig, load_config
+from training.settings.errors import UsageError, nearest
 
 ENV = "RigidEnvs/Push-v0"
 

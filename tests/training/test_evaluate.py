@@ -4,15 +4,15 @@ from PIL import Image
 from scipy.stats import binomtest
 
 from tests.training.reach import ReachEnv, straight_to_the_goal
-from training import evaluate as evaluate_module
-from training import policy as policy_module
-from training.errors import UsageError
-from training.evaluate import evaluate, print_evaluation, wilson_interval
-from training.gif import GifWriter
-from training.policy import Policy, scripted_policy
-from training.record import record
-from training.train import train
-from training.trained_policy import trained_policy
+from training.policies import policy as policy_module
+from training.policies.policy import Policy, scripted_policy
+from training.policies.trained_policy import trained_policy
+from training.results import evaluate as evaluate_module
+from training.results.evaluate import evaluate, print_evaluation, wilson_interval
+from training.results.gif import GifWriter
+from training.results.record import record
+from training.sb3.train import train
+from training.settings.errors import UsageError
 
 
 @pytest.fixture

@@ -3,11 +3,11 @@
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
-from training import train as train_module
-from training.errors import UsageError
-from training.policy_file import read_policy
-from training.train import resume, train
-from training.trained_policy import trained_policy
+from training.policies.policy_file import read_policy
+from training.policies.trained_policy import trained_policy
+from training.sb3 import train as train_module
+from training.sb3.train import resume, train
+from training.settings.errors import UsageError
 
 FINER = {"fidelity": "accurate"}
 

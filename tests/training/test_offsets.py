@@ -7,13 +7,13 @@ from gymnasium import spaces
 from stable_baselines3 import SAC
 
 from tests.training.reach import ReachVectorEnv
-from training.config import OFFSETS
-from training.errors import UsageError
-from training.offsets import SCALE, GoalOffsets, OffsetPolicy
-from training.policy_file import load_policy_file
-from training.train import train
-from training.trained_policy import trained_policy
-from training.vec_env import RigidVecEnv
+from training.policies.offsets import SCALE, GoalOffsets, OffsetPolicy
+from training.policies.policy_file import load_policy_file
+from training.policies.trained_policy import trained_policy
+from training.sb3.train import train
+from training.sb3.vec_env import RigidVecEnv
+from training.settings.config import OFFSETS
+from training.settings.errors import UsageError
 
 
 def test_features_are_the_observation_the_way_to_the_goal_and_the_goal():
@@ -55,5 +55,7 @@ def test_it_is_for_goals_and_for_sac(quick_ppo):
     box = spaces.Box(-1.0, 1.0, (3,))
     with pytest.raises(UsageError, match="takes observations with goals, not Dict"):
         GoalOffsets(spaces.Dict({"observation": box}))
-    with pytest.raises(UsageError, match=r"policy is 'training.offsets.OffsetPolicy', should be"):
+    with pytest.raises(
+        UsageError, match=r"policy is 'training.policies.offsets.OffsetPolicy', should be"
+    ):
         quick_ppo.replace(policy=OFFSETS)

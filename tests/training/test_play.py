@@ -4,12 +4,12 @@ import numpy as np
 import pygame
 import pytest
 
+from rigid_envs.rendering.window import Key, Window
 from rigid_envs.tasks import Push, Stack, Throw
-from rigid_envs.window import Key, Window
-from training import cli
-from training.environments import make_single_env
-from training.errors import UsageError
-from training.play import FAST_PACE, MOVES, PACE, Game, action_of, play
+from training.commands import cli
+from training.commands.play import FAST_PACE, MOVES, PACE, Game, action_of, play
+from training.settings.environments import make_single_env
+from training.settings.errors import UsageError
 
 PUSH, STACK, THROW = (f"RigidEnvs/{name}-v0" for name in ("Push", "Stack", "Throw"))
 ALONG_X = -90.0  # azimuth at which x points to the right of a picture and y into it

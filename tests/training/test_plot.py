@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from training import cli
-from training.config import TrainConfig
-from training.errors import UsageError
-from training.plot import mean_and_spread, plot_learning_curves
-from training.run_folder import RunFolder, create_run_folder
+from training.commands import cli
+from training.results.plot import mean_and_spread, plot_learning_curves
+from training.runs.run_folder import RunFolder, create_run_folder
+from training.settings.config import TrainConfig
+from training.settings.errors import UsageError
 
 HEADER = "time/total_timesteps,time/wall_time,rollout/success_rate\n"
 

@@ -16,13 +16,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.training.reach import ReachVectorEnv
-from training import cli
-from training.config import ALGORITHMS, BOUNDED, load_config, packaged_environments
-from training.errors import UsageError
-from training.evaluate import evaluate
-from training.policy_file import load_policy_file, read_policy
-from training.train import train
-from training.trained_policy import trained_policy
+from training.commands import cli
+from training.policies.policy_file import load_policy_file, read_policy
+from training.policies.trained_policy import trained_policy
+from training.results.evaluate import evaluate
+from training.sb3.train import train
+from training.settings.config import ALGORITHMS, BOUNDED, load_config, packaged_environments
+from training.settings.errors import UsageError
 
 KEYS = ("observation", "achieved_goal", "desired_goal")
 
@@ -130,7 +130,8 @@ def test_one_world_is_told_to_be_an_axis_short(kept):
 
 def test_reading_takes_neither_torch_nor_stable_baselines(kept):
     code = (
-        "import sys; from pathlib import Path; from training.policy_file import load_policy_file;"
+        "import sys; from pathlib import Path;"
+        "from training.policies.policy_file import load_policy_file;"
         "load_policy_file(Path(sys.argv[1]));"
         "sys.exit(any(name in sys.modules for name in ('torch', 'stable_baselines3')))"
     )

@@ -6,15 +6,15 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.her import HerReplayBuffer
 
-from training.config import load_config
-from training.environments import make_vector_env
-from training.evaluate import evaluate
-from training.plot import plot_learning_curves
-from training.policy import scripted_policy
-from training.record import record
-from training.train import train
-from training.trained_policy import trained_policy
-from training.vec_env import RigidVecEnv
+from training.policies.policy import scripted_policy
+from training.policies.trained_policy import trained_policy
+from training.results.evaluate import evaluate
+from training.results.plot import plot_learning_curves
+from training.results.record import record
+from training.sb3.train import train
+from training.sb3.vec_env import RigidVecEnv
+from training.settings.config import load_config
+from training.settings.environments import make_vector_env
 
 PUSH = "RigidEnvs/Push-v0"
 WORLDS = 4

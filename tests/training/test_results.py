@@ -8,18 +8,18 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from training import cli
-from training.config import TrainConfig, load_config
-from training.errors import UsageError
-from training.evaluate import FIRST_SEED, evaluate
-from training.model_state import read_state
-from training.policy_file import load_policy_file, read_policy
-from training.recording import ROWS, _command
-from training.result import read_result, read_results, task_name
-from training.results import SOURCE, update_results
-from training.results_page import README, check_pages
-from training.run_folder import RunFolder
-from training.train import train
+from training.commands import cli
+from training.policies.policy_file import load_policy_file, read_policy
+from training.results.evaluate import FIRST_SEED, evaluate
+from training.results.recording import ROWS, _command
+from training.results.result import read_result, read_results, task_name
+from training.results.results import SOURCE, update_results
+from training.results.results_page import README, check_pages
+from training.runs.run_folder import RunFolder
+from training.sb3.model_state import read_state
+from training.sb3.train import train
+from training.settings.config import TrainConfig, load_config
+from training.settings.errors import UsageError
 
 PLACE = Path("results/ppo/Test-Reach-v0_seed3")
 
@@ -167,7 +167,7 @@ def test_pictures_follow_even_if_ctrl_c_came_before_them(repository, runs, monke
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("training.results._draw", interrupted)
+        patched.setattr("training.results.results._draw", interrupted)
         with pytest.raises(KeyboardInterrupt):
             update(repository, second)
     said = update(repository, log_folder=runs / "nothing")

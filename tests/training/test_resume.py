@@ -18,23 +18,23 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import CSVOutputFormat
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from training import checkpoint as checkpoint_module
-from training import cli
-from training import train as train_module
-from training.errors import UsageError
-from training.model_state import read_state
-from training.plot import read_learning_curve
-from training.policy_file import load_policy_file, read_policy
-from training.progress import TrainingProgress
-from training.run_folder import RunFolder
-from training.train import resume, train
+from training.commands import cli
+from training.policies.policy_file import load_policy_file, read_policy
+from training.results.plot import read_learning_curve
+from training.runs.run_folder import RunFolder
+from training.sb3 import checkpoint as checkpoint_module
+from training.sb3 import train as train_module
+from training.sb3.model_state import read_state
+from training.sb3.progress import TrainingProgress
+from training.sb3.train import resume, train
+from training.settings.errors import UsageError
 
 KILLED = """
 import sys
 from pathlib import Path
 import tests.training.conftest
-from training.config import load_config
-from training.train import train
+from training.settings.config import load_config
+from training.sb3.train import train
 config = load_config(sys.argv[1], "Test/Reach-v0", Path(sys.argv[2]))
 train(config, Path(sys.argv[3]), save_every=1, quiet=True)
 """
@@ -258,7 +258,7 @@ def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path
             train(quick_ppo.replace(n_timesteps=400), tmp_path, save_every=1, quiet=True)
     folder = RunFolder(tmp_path / "ppo" / "Test-Reach-v0_1")
     with monkeypatch.context() as patched:
-        patched.setattr("training.learning_curve.shutil.copyfile", full_disk)
+        patched.setattr("training.sb3.learning_curve.shutil.copyfile", full_disk)
         with pytest.raises(UsageError, match=r"training stopped in .*: No space left on device"):
             resume(folder, quiet=True)
     assert resume(folder, quiet=True).steps == 400

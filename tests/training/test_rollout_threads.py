@@ -5,8 +5,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy as Policy
 
-from training.config import load_config
-from training.train import train
+from training.sb3.train import train
+from training.settings.config import load_config
 
 
 @pytest.mark.parametrize("threads", [1, 2])

@@ -3,16 +3,16 @@ import subprocess
 
 import pytest
 
-from training import run_folder
-from training.config import load_config
-from training.errors import UsageError
-from training.run_folder import (
+from training.runs import run_folder
+from training.runs.run_folder import (
     RunFolder,
     create_run_folder,
     git_commit,
     latest_run,
     written_whole,
 )
+from training.settings.config import load_config
+from training.settings.errors import UsageError
 
 
 def test_each_run_gets_a_folder_of_its_own(tmp_path, quick_ppo):

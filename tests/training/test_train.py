@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
-from training import train as train_module
-from training.errors import UsageError
-from training.plot import plot_learning_curves, read_learning_curve
-from training.progress import StopAtSuccess
-from training.train import LinearSchedule, train
-from training.trained_policy import trained_policy
+from training.policies.trained_policy import trained_policy
+from training.results.plot import plot_learning_curves, read_learning_curve
+from training.sb3 import train as train_module
+from training.sb3.progress import StopAtSuccess
+from training.sb3.train import LinearSchedule, train
+from training.settings.errors import UsageError
 
 
 def test_a_run_leaves_logs_and_a_policy(quick_ppo, tmp_path):

@@ -8,11 +8,11 @@ import pytest
 import yaml
 from optuna.trial import TrialState
 
-from training import cli, tuning
-from training.config import TrainConfig, load_config
-from training.errors import UsageError
-from training.search_space import SPACES, OneOf, draw, with_drawn
-from training.tuning import tune
+from training.commands import cli, tuning
+from training.commands.tuning import tune
+from training.settings.config import TrainConfig, load_config
+from training.settings.errors import UsageError
+from training.settings.search_space import SPACES, OneOf, draw, with_drawn
 
 
 def study_of(path) -> optuna.Study:

@@ -11,7 +11,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 from tests.training.reach import ReachVectorEnv, straight_to_the_goal
-from training.vec_env import RigidVecEnv
+from training.sb3.vec_env import RigidVecEnv
 
 WORLDS = 6
 

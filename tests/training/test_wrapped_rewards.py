@@ -14,10 +14,10 @@ from stable_baselines3.her import HerReplayBuffer
 
 from rigid_envs import wrappers
 from rigid_envs.wrappers import Stage, goal_potential
-from training.config import load_config
-from training.environments import make_training_env, make_vector_env
-from training.errors import UsageError
-from training.vec_env import RigidVecEnv
+from training.sb3.vec_env import RigidVecEnv
+from training.settings.config import load_config
+from training.settings.environments import make_training_env, make_vector_env
+from training.settings.errors import UsageError
 
 PUSH = "RigidEnvs/Push-v0"
 WORLDS = 4

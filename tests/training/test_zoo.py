@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from training.config import ALGORITHMS, PACKAGED, load_config, packaged_environments
+from training.settings.config import ALGORITHMS, PACKAGED, load_config, packaged_environments
 
 ROOT = Path(__file__).parents[2]
 ZOO = """

@@ -1,0 +1,1 @@
+"""What can be asked of a world: energies, contacts, the largest stable step."""

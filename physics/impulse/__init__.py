@@ -1,0 +1,1 @@
+"""The impulse law: contact impulses by sequential sweeps."""

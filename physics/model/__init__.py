@@ -1,0 +1,1 @@
+"""A scene at a fidelity as arrays: constants, state and working memory of the kernels."""

@@ -1,0 +1,78 @@
+"""Damping coefficients of the normal force, from the restitution that a user asks for."""
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+Array = np.ndarray
+
+
+# below this restitution the approach ends within the step's resolution anyway
+_LEAST_RESTITUTION = 5e-4
+
+
+def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
+    """Root of an increasing function, to round-off."""
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):  # nothing is left between them
+            break
+        if function(middle) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def clamped_dashpot_restitution(zeta: float) -> float:
+    """Restitution of f = max(0, k d + c d') at the damping ratio zeta.
+
+    The contact ends where the acceleration vanishes; there the speed is v exp(-zeta omega t).
+    """
+    if zeta < 1.0:
+        damped = math.sqrt(1.0 - zeta**2)
+        return math.exp(-zeta / damped * (math.pi - 2.0 * math.atan2(zeta, damped)))
+    if zeta == 1.0:
+        return math.exp(-2.0)
+    over = math.sqrt(zeta**2 - 1.0)
+    return math.exp(-zeta / over * 2.0 * math.log(zeta + over))
+
+
+def damping_coefficients(restitution: Array, law: str) -> Array:
+    """As `damping_coefficient`, of any number of contacts: each value is worked out once."""
+    values, where = np.unique(restitution, return_inverse=True)
+    found = [damping_coefficient(e, law) for e in values.tolist()]
+    return np.array(found)[where].reshape(restitution.shape)
+
+
+@lru_cache(maxsize=4096)
+def damping_coefficient(restitution: float, law: str) -> float:
+    """The law's dimensionless damping: a of "overlap", the damping ratio zeta of "dashpot"."""
+    e = max(restitution, _LEAST_RESTITUTION)
+    if e >= 1.0:
+        return 0.0
+    if law == "dashpot":
+        return _bisect(lambda zeta: e - clamped_dashpot_restitution(zeta), 0.0, 100.0)
+    # with s = -ln(1 - a e) the equation is well conditioned up to a = 1/e
+
+    def excess(s: float) -> float:
+        a = -math.expm1(-s) / e
+        return s + math.log1p(a) - a * (1.0 + e)
+
+    # excess falls from 0 before it rises through the root
+    return -math.expm1(-_bisect(excess, 1.2 * (1.0 - e), 2.0 / e)) / e
+
+
+def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:
+    """Floor of the impact speed, m/s: a body at rest under its weight is damped half critically.
+
+    Args:
+        damping: a of the law, of any number of contacts.
+        gravity: m/s^2.
+        omega: rad/s, of each.
+    """
+    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega. With all of that a
+    # flat or a tall block, whose rocking is faster than its bobbing, would chatter and creep
+    return np.maximum(damping * gravity / omega, 1e-9)

@@ -1,0 +1,1 @@
+"""How bodies move: integrator, kinematics, gravity and drives."""

@@ -1,0 +1,105 @@
+"""Frames of all solids: rotation matrix, velocity and angular velocity from the state."""
+
+from functools import cache
+
+from physics.jit import LANES, at, stage
+from physics.model.features import GENERAL, NO_ROTATION
+from physics.rotation import rotation_entries
+
+
+@stage
+def place(solid, i):
+    """Writes the rotation matrix of a solid in lane i from its quaternion."""
+    q, R = solid.orientation, solid.rotation
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(
+        q[0, i], q[1, i], q[2, i], q[3, i]
+    )
+    R[0, i] = r00
+    R[1, i] = r01
+    R[2, i] = r02
+    R[3, i] = r10
+    R[4, i] = r11
+    R[5, i] = r12
+    R[6, i] = r20
+    R[7, i] = r21
+    R[8, i] = r22
+
+
+@stage
+def place_statics(model, work):
+    """Writes the rows of the statics, once for all worlds and steps."""
+    movers = model.mover.shape[0]
+    for s in range(model.static.shape[0]):
+        solid = work.solid[movers + s]
+        for i in range(LANES):
+            for c in range(3):
+                solid.position[c, i] = model.static[s, c]
+                solid.velocity[c, i] = 0.0
+                solid.spin[c, i] = 0.0
+                solid.shift[c, i] = 0.0
+            for c in range(4):
+                solid.orientation[c, i] = model.static[s, 3 + c]
+            solid.swing[i] = 0.0
+            place(solid, i)
+
+
+@stage
+def place_tools(model, work):
+    """Writes what never changes of the tools, once for all steps: they may stand askew."""
+    for m in range(model.mover.shape[0]):
+        if not model.mover[m].turns:
+            solid = work.solid[m]
+            for i in range(LANES):
+                for c in range(3):
+                    solid.spin[c, i] = 0.0
+                place(solid, i)
+
+
+@stage
+def spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
+    """Omega = R J0^-1 R^T L of a body with quaternion x y z w; jx, jy, jz are 1/moments."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(x, y, z, w)
+    bx = jx * (r00 * lx + r10 * ly + r20 * lz)
+    by = jy * (r01 * lx + r11 * ly + r21 * lz)
+    bz = jz * (r02 * lx + r12 * ly + r22 * lz)
+    return (
+        r00 * bx + r01 * by + r02 * bz,
+        r10 * bx + r11 * by + r12 * bz,
+        r20 * bx + r21 * by + r22 * bz,
+    )
+
+
+@cache
+def make_kinematics(features):
+    """Stage that brings the frames of the movers up to their state."""
+    rotation = features.rotation
+
+    @stage
+    def kinematics(model, work):
+        for m in range(model.mover.shape[0]):
+            solid, constants = work.solid[m], model.mover[m]
+            q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
+            v, omega = solid.velocity, solid.spin
+            inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
+            for i in range(LANES):
+                v[0, i] = at(inverse_mass, i) * P[0, i]
+                v[1, i] = at(inverse_mass, i) * P[1, i]
+                v[2, i] = at(inverse_mass, i) * P[2, i]
+            if not constants.turns:  # see place_tools
+                continue
+            for i in range(LANES):
+                place(solid, i)
+            for i in range(LANES):
+                lx, ly, lz = L[0, i], L[1, i], L[2, i]
+                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
+                if rotation == NO_ROTATION:
+                    ox, oy, oz = 0.0, 0.0, 0.0
+                elif rotation == GENERAL:
+                    ox, oy, oz = spin_of(q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz)
+                else:
+                    ox, oy, oz = jx * lx, jx * ly, jx * lz
+                omega[0, i] = ox
+                omega[1, i] = oy
+                omega[2, i] = oz
+
+    return kinematics

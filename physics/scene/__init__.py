@@ -1,0 +1,1 @@
+"""What a user writes: scenes, shapes and fidelities, frozen and validated."""

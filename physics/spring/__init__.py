@@ -1,0 +1,1 @@
+"""The spring law: contact forces from penetrations."""

@@ -1,0 +1,1 @@
+"""The time layers: frame, collision step, substep; threads; the readout."""

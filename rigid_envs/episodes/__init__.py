@@ -1,0 +1,1 @@
+"""Episodes of a task in many worlds, without Gymnasium."""

@@ -1,0 +1,1 @@
+"""A software renderer: cameras, what is shown of a world, the window."""

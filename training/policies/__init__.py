@@ -1,0 +1,1 @@
+"""Policies as functions, and the files that hold them."""

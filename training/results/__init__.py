@@ -1,0 +1,1 @@
+"""Evaluation, video, learning curves and recorded results."""

@@ -1,0 +1,89 @@
+"""Films a policy: an mp4 or a GIF and a still, with no display."""
+
+import os
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import imageio.v2 as imageio
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from training.policies.policy import Policy
+from training.results.evaluate import FIRST_SEED
+from training.results.gif import WIDTH, GifWriter
+from training.settings.environments import make_single_env
+from training.settings.errors import UsageError
+
+DEFAULT_FPS = 25
+SUFFIXES = (".mp4", ".gif")
+
+
+def record(
+    policy: Policy,
+    video: Path,
+    *,
+    episodes: int = 8,
+    seed: int = FIRST_SEED,
+    quiet: bool = False,
+    gif_width: int = WIDTH,
+    **env_kwargs: Any,
+) -> tuple[Path, Path]:
+    """Plays the episodes with seeds seed, seed + 1, ... on the single environment and films them.
+
+    Args:
+        policy: What acts.
+        video: The mp4 or GIF to write; the still takes the same name with .png.
+        episodes: How many.
+        seed: Seed of the first.
+        quiet: Show no progress.
+        gif_width: Of a GIF, in pixels; an mp4 has the size of the pictures.
+        env_kwargs: Arguments of the environment, over those that the policy was trained with.
+
+    Returns:
+        The paths of the video and of the still, which shows the middle of the first episode.
+
+    Raises:
+        UsageError: A number or the name is wrong, or the environment refuses its arguments.
+    """
+    if episodes < 1:
+        raise UsageError(f"number of episodes is {episodes}, should be at least 1")
+    if video.suffix not in SUFFIXES:
+        raise UsageError(f"video is {str(video)!r}, should end in {' or '.join(SUFFIXES)}")
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    arguments = {**policy.env_kwargs, **env_kwargs, "render_mode": "rgb_array"}
+    env = make_single_env(policy.env_id, **arguments)
+    video.parent.mkdir(parents=True, exist_ok=True)
+    still = video.with_suffix(".png")
+    fps = env.metadata.get("render_fps", DEFAULT_FPS)
+    console = Console(quiet=quiet or not sys.stdout.isatty())
+    with _writer(video, fps, gif_width) as writer, closing(env):
+        for episode in track(range(episodes), "filming", transient=True, console=console):
+            frames = _film_episode(env, policy, seed + episode)
+            if episode == 0:
+                imageio.imwrite(still, frames[len(frames) // 2])
+            for frame in frames:
+                writer.append_data(frame)
+    return video, still
+
+
+def _writer(video: Path, fps: float, gif_width: int) -> Any:
+    if video.suffix == ".gif":
+        return GifWriter(video, fps, gif_width)
+    # The codec wants even sides: blocks of 2 keep the picture's size, blocks of 16 stretch it.
+    return imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
+
+
+def _film_episode(env: Any, policy: Policy, seed: int) -> list[np.ndarray]:
+    observation, _ = env.reset(seed=seed)
+    frames = [env.render()]
+    ended = False
+    while not ended:
+        batch_of_one = {key: np.asarray(value)[None] for key, value in observation.items()}
+        action = np.asarray(policy.act(batch_of_one))[0].astype(env.action_space.dtype)
+        observation, _, terminated, truncated, _ = env.step(action)
+        frames.append(env.render())
+        ended = terminated or truncated
+    return frames

@@ -1,0 +1,212 @@
+"""Makes a result of a finished run: evaluates its policy and keeps what is small."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from training.policies.export import export_run
+from training.policies.policy_header import Success
+from training.policies.trained_policy import trained_policy
+from training.results.evaluate import FIRST_SEED, evaluate, wilson_interval
+from training.results.plot import read_learning_curve
+from training.results.result import RESULT, Result, parse_result, read_results, task_name
+from training.runs.run_folder import RunFolder
+from training.sb3.model_state import read_state
+from training.settings.config import PACKAGED, TrainConfig, load_config
+from training.settings.errors import UsageError
+
+LARGEST = 300_000
+"""Bytes of a policy or a picture: a repository keeps them for ever."""
+ROWS = 200
+"""Of a learning curve: more than a picture of it can show."""
+COLUMNS = ("rollout/", "time/")
+"""Beginnings of the columns that are kept of it."""
+
+
+def record_run(
+    folder: RunFolder,
+    repository: Path,
+    episodes: int = 1000,
+    *,
+    replace: bool = False,
+    quiet: bool = False,
+) -> Result:
+    """Evaluates the policy of a finished run and writes a result, whole or not at all.
+
+    Args:
+        folder: The run.
+        repository: Where the folder of results is.
+        episodes: How many to evaluate on.
+        replace: Whether a result of the same kind and seed gives way.
+        quiet: Show no progress.
+
+    Raises:
+        UsageError: The run is not finished or damaged, it or another of its seed is recorded
+            already, its policy is too large, or the files cannot be written.
+    """
+    config = folder.config()
+    state, run, versions = _finished(folder), *_descriptions(folder)
+    if run.get("seed") != config.seed:
+        raise UsageError(
+            f"run.json is damaged: seed is {run.get('seed')!r}, but config.yaml has {config.seed}"
+        )
+    _check_place(folder, config, run, repository, replace)
+    read_learning_curve(folder)
+    if folder.policy.exists() and folder.policy.stat().st_size > LARGEST:
+        size = folder.policy.stat().st_size
+        raise UsageError(f"its policy takes {size:,} bytes, should be at most {LARGEST:,}")
+    policy = trained_policy(folder.path)
+    outcome = evaluate(policy, episodes, seed=FIRST_SEED, quiet=quiet)
+    seconds, resumed = float(state["seconds"]), run.get("resumed", [])
+    values = {
+        "algorithm": config.algo,
+        "env_id": config.env_id,
+        "arguments": config.last_env_kwargs,
+        "seed": config.seed,
+        "steps": state.get("steps"),
+        "seconds": round(seconds, 3),
+        "environment_share": round(float(state["seconds_in_envs"]) / seconds, 4),
+        "episodes": episodes,
+        "first_seed": FIRST_SEED,
+        "fidelity": config.last_env_kwargs.get("fidelity"),
+        "success_at_end": _share(outcome.success_at_end),
+        "success_at_any_time": _share(outcome.success_at_any_time),
+        "command": _command(config) + _threads(run),
+        "commit": run.get("git_commit"),
+        "resumed": len(resumed) if isinstance(resumed, list) else resumed,
+        "started": run.get("started"),
+        "versions": versions,
+    }
+    result = parse_result(values, str(folder.path))
+    try:
+        _write(result, folder, config, repository)
+    except OSError as error:
+        raise UsageError(f"{result.folder(repository)} cannot be written: {error}") from None
+    return result
+
+
+def _finished(folder: RunFolder) -> dict[str, Any]:
+    """The state at the end of a run."""
+    if not folder.checkpoints():
+        raise UsageError("it has no checkpoint yet")
+    try:
+        state = read_state(folder.checkpoint)
+        finished, in_envs = state["finished"], state.get("seconds_in_envs")
+        if in_envs is not None and not 0 <= float(in_envs) <= float(state["seconds"]) > 0:
+            raise ValueError(f"seconds_in_envs is {in_envs} of {state['seconds']}")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"{folder.checkpoint.name}/state.json is damaged: {error}") from None
+    if finished is not True:
+        raise UsageError(f"it is not finished: rigid-envs train --resume {folder.path}")
+    if in_envs is None:
+        raise UsageError("how much of its time the environments took is not known: train anew")
+    return dict(state)
+
+
+def _descriptions(folder: RunFolder) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What run.json and versions.json say."""
+    found = []
+    for name in ("run.json", "versions.json"):
+        try:
+            found.append(json.loads((folder.path / name).read_text(encoding="utf-8")))
+        except (OSError, ValueError) as error:
+            raise UsageError(f"{name} is damaged: {error}") from None
+        if not isinstance(found[-1], dict):
+            raise UsageError(f"{name} is damaged: it should be a mapping")
+    return found[0], found[1]
+
+
+def _check_place(
+    folder: RunFolder, config: TrainConfig, run: dict[str, Any], repository: Path, replace: bool
+) -> None:
+    """Raises UsageError where a result would take another's place or stand in the wrong table."""
+    task = task_name(config.env_id, config.last_env_kwargs)
+    for other in read_results(repository):
+        if (other.algorithm, other.task) != (config.algo, task):
+            continue
+        place = other.folder(repository).relative_to(repository)
+        again = other.seed == config.seed
+        if again and replace:
+            continue
+        same = again and other.started == run.get("started")
+        if same and other.arguments == config.last_env_kwargs:
+            raise UsageError(f"it is recorded already, in {place}")
+        settings = load_config(config.algo, config.env_id, other.folder(repository) / "config.yaml")
+        for name, value in settings.replace(seed=config.seed).as_mapping().items():
+            if (own := config.as_mapping()[name]) != value:
+                raise UsageError(
+                    f"its {name} is {own}, but {place}, of the same table, has {value}; runs of a "
+                    "table differ by their seed alone; delete its folders to begin it anew"
+                )
+        if again:
+            raise UsageError(
+                f"{place} holds another run of its seed; to put this in its place: "
+                f"rigid-envs results --replace {folder.path}"
+            )
+
+
+def _share(outcome: np.ndarray) -> dict[str, float]:
+    low, high = wilson_interval(int(outcome.sum()), len(outcome))
+    rate = float(outcome.mean())
+    # where all or none succeed, rounding puts the interval's end beside the rate
+    return {"low": min(low, rate), "rate": rate, "high": max(high, rate)}
+
+
+def _command(config: TrainConfig) -> str:
+    """The shortest command that trains the same again, in the repository's folder."""
+    words = f"rigid-envs train --algo {config.algo} --env {config.env_id}"
+    try:
+        packaged = load_config(config.algo, config.env_id, PACKAGED / f"{config.algo}.yaml")
+        if packaged.replace(seed=config.seed) == config:
+            return f"{words} --seed {config.seed}"
+        if packaged.replace(seed=config.seed, n_timesteps=config.n_timesteps) == config:
+            return f"{words} --seed {config.seed} -n {config.n_timesteps}"
+    except UsageError:  # no settings come with us for it
+        pass
+    task = task_name(config.env_id, config.last_env_kwargs)
+    return f"{words} --config results/{config.algo}/{task}_seed{config.seed}/config.yaml"
+
+
+def _threads(run: dict[str, Any]) -> str:
+    """The threads of torch that a run was told: with others its sums, and so its policy, differ."""
+    words = run.get("command")
+    told = [str(word) for word in words] if isinstance(words, list) else []
+    for word, after in zip(told, [*told[1:], ""], strict=True):
+        name, _, value = word.partition("=")
+        if name == "--num-threads":
+            return f" --num-threads {value or after}"
+    return ""
+
+
+def _write(result: Result, folder: RunFolder, config: TrainConfig, repository: Path) -> None:
+    place = result.folder(repository)
+    unfinished = place.with_name(place.name + ".tmp")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    unfinished.mkdir(parents=True)
+    try:
+        rate = result.success_at_end["rate"]
+        success = Success(result.episodes, rate, result.fidelity, result.first_seed)
+        export_run(folder, unfinished / "policy.policy", success=success)
+        (unfinished / "config.yaml").write_text(config.as_yaml(), encoding="utf-8")
+        _thin(folder.progress, unfinished / "progress.csv")
+        (unfinished / RESULT).write_text(result.as_json(), encoding="utf-8")
+        shutil.rmtree(place, ignore_errors=True)
+        unfinished.rename(place)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _thin(source: Path, target: Path) -> None:
+    """Copies a learning curve with at most ROWS rows, the first and the last among them."""
+    with source.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    columns = [name for name in rows[0] if name.startswith(COLUMNS)]
+    kept = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).round().astype(int))
+    with target.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows[index] for index in kept)

@@ -1,0 +1,1 @@
+"""The Stable-Baselines3 adapter: training, callbacks, checkpoints."""
