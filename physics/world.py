@@ -1,29 +1,28 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
-import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.analysis import diagnostics, energies, stability
+from physics.analysis.diagnostics import Contacts
+from physics.analysis.parameter_limits import ParameterLimits
+from physics.analysis.solids import Solids
 from physics.analysis.step_limits import cause_of_divergence, check_step
 from physics.errors import ContactOverflow, SimulationDiverged
-from physics.jit import LANES, columns
-from physics.model.build import build, spread
-from physics.model.features import NO_ROTATION
-from physics.model.pairs import Layout
-from physics.model.state import FIRST_TOUCH, MOVING, PRESSED, State, allocate
+from physics.model.features import Features
+from physics.model.state import State
 from physics.model.state import copy as copy_state
-from physics.model.tables import Model
-from physics.model.workspace import Work
 from physics.motion.drive_commands import by_worlds, make_command, make_lead
 from physics.scene.fidelity import Fidelity, resolve
-from physics.scene.parameters import Parameters, with_parameters
-from physics.scene.scene import Body, Drive, Scene
+from physics.scene.parameters import Parameters, check_ranges, check_values, with_parameters
+from physics.scene.scene import Scene
 from physics.scene.validation import array, instance, integer, positive
-from physics.step.readout import WIDTH, make_readout
-from physics.step.threads import check_threads, share_out
-from physics.step.time_layers import cut, make_advance
-from physics.variation import Variation, spin_momentum
+from physics.step.readout import Readout
+from physics.step.simulation import Simulation, read_only
+from physics.step.threads import check_threads
+from physics.step.write_state import write_state
 
 Array = np.ndarray
 
@@ -37,7 +36,7 @@ class Snapshot(NamedTuple):
     parameters: Parameters | None = None  # of varied worlds
 
 
-class World(Variation):
+class World:
     """`count` copies of a scene, advanced together.
 
     Args:
@@ -69,77 +68,21 @@ class World(Variation):
         self.fidelity = resolve(fidelity)
         self.count = integer("count", count, low=1)
         self.threads = check_threads(threads)
-        self._bodies = len(scene.bodies)
-        self._base: Model
         varied = instance("varied", varied, bool)
-        self._base, self._features = build(scene, self.fidelity, varied)
-        self._model = spread(self._base, self.count) if varied else self._base
-        self._layout = Layout.of(scene, self.fidelity) if varied else None
-        self._parameters = Parameters.of(scene, self.count) if varied else Parameters.of(scene)
-        self._checked: tuple[Parameters, Parameters] | None = None
-        self._allow_unstable = instance("allow_unstable", allow_unstable, bool)
+        self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
+        self._simulation = Simulation(scene, self.fidelity, self.count, self.threads, varied)
         if not allow_unstable:
-            check_step(scene, self.fidelity, self._base, self._features)
-        self._find_kernels()
-        self._idle: list[Work] = []
-        self._sides_between: dict[tuple[int, int], Array] = {}
-        self._settled = False
-        self._table = columns((len(self._base.mover), WIDTH), self.count, float)
-        self._lent = False
-        self._state = allocate(self._base, self._features, self.count)
-        self._everyone = np.ones(self.count, dtype=bool)
-        self._span, self._substeps = math.nan, 0
-        self._initial = self._initial_rows()
-        self._reset(self._everyone)
+            check_step(scene, self.fidelity, self._simulation.base, self.features)
+        self._limits = ParameterLimits(scene, self.fidelity)
+        self._solids = Solids(self._simulation.base)
+        self._span = 0.0
 
     def __repr__(self) -> str:
         """Names what the world is made of."""
         return (
-            f"World({self._bodies} bodies, {len(self.scene.drives)} drives, "
+            f"World({len(self.scene.bodies)} bodies, {len(self.scene.drives)} drives, "
             f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count})"
         )
-
-    def _initial_rows(self) -> Array:
-        """The scene's state as rows [movers] of MOVING."""
-        bodies = self.scene.bodies
-        movers: list[Body | Drive] = [*bodies, *self.scene.tools]
-        rows = np.zeros(len(movers), dtype=MOVING)
-        rows["position"] = rows["reference"] = [m.position for m in movers]
-        rows["orientation"] = [m.orientation for m in movers]
-        if bodies:
-            velocity = np.array([b.linear_velocity for b in bodies])
-            spin = np.array([b.angular_velocity for b in bodies])
-            turn = np.array([b.orientation for b in bodies])
-            inertia = self._base.mover["inertia"][: len(bodies)]
-            inverse_mass = self._base.mover["inverse_mass"][: len(bodies)]
-            rows["momentum"][: len(bodies)] = velocity / inverse_mass[:, None]
-            rows["angular_momentum"][: len(bodies)] = spin_momentum(inertia, turn, spin)
-        return rows
-
-    def _reset(self, worlds: Array) -> None:
-        """Puts the chosen worlds into the scene's state, at time zero."""
-        self._state.mover[worlds] = self._initial
-        if self._features.varied:  # the scene's velocities, with masses of their own
-            mover, bodies = self._state.mover, self._bodies
-            velocity = np.array([b.linear_velocity for b in self.scene.bodies]).reshape(-1, 3)
-            spin = np.array([b.angular_velocity for b in self.scene.bodies]).reshape(-1, 3)
-            turn = np.array([b.orientation for b in self.scene.bodies]).reshape(-1, 4)
-            chosen = np.flatnonzero(worlds)
-            inverse, inertia = (self._of_bodies(x, chosen) for x in ("inverse_mass", "inertia"))
-            mover["momentum"][worlds, :bodies] = velocity / inverse[..., None]
-            mover["angular_momentum"][worlds, :bodies] = spin_momentum(inertia, turn, spin)
-        self._state.world["time"][worlds] = 0.0
-        self._forget(worlds)
-
-    def _forget(self, worlds: Array) -> None:
-        """Clears what is hidden: candidates, contact memories, forces, divergence."""
-        state = self._state
-        self._table_valid = self._settled = False
-        state.world["stale"][worlds] = 1
-        state.world["diverged"][worlds] = 0
-        touch = state.touch[..., : self.count]
-        touch[:, PRESSED, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
-        state.world["overflow"][worlds] = 0
 
     # --- time ---------------------------------------------------------------------------------
 
@@ -157,80 +100,40 @@ class World(Variation):
         """
         if type(time) is not float or time != self._span:  # frames are all of one length
             self._span = positive("time", time)
-            self._substeps = cut(self._span, self.fidelity.substep)
-        self._run(self._span / self._substeps, self._substeps, self._mask(worlds))
+        if not self._simulation.advance(self._span, self._mask(worlds)):
+            self._raise_failure()
 
-    def _run(self, h: float, substeps: int, worlds: Array) -> None:
-        kernel, everyone = self._advance, bool(worlds.all())
-        if self._lent:  # who has read the table keeps it
-            before = self._table
-            self._table, self._lent = np.empty_like(before), False
-            if self._table_valid and not everyone:
-                self._table[...] = before
-        model, state, table = self._model, self._state, self._table
-        together = self.fidelity.collision_substeps
-        groups, idle = -(-self.count // LANES), self._idle
-
-        def run(first: int, last: int) -> Any:
-            try:
-                work = idle.pop()
-            except IndexError:  # as many as threads are made, once
-                work = Work.of(self._base, self._features)
-            failed = kernel(model, state, work, table, worlds, first, last, h, substeps, together)
-            idle.append(work)
-            return failed
-
-        if share_out(run, groups, self.threads) == 0:
-            # a world that diverged before isn't written, nor one that isn't advanced
-            self._table_valid = self._table_valid or everyone
-            self._settled = self._settled or (everyone and substeps > 0)
-            return
-        self._table_valid = False
-        diverged = np.flatnonzero((state.world["diverged"] != 0) & worlds).tolist()
-        if diverged:
-            self._raise_diverged(h, diverged)
-        full = np.flatnonzero((state.world["overflow"] != 0) & worlds).tolist()
-        raise ContactOverflow(
-            f"worlds {full}: two bodies have more than eight touching particle pairs a "
-            "particle; they overlap deeply, or Fidelity.skin is too wide"
+    def _raise_failure(self) -> None:
+        """Raises the error of the worlds whose last steps failed."""
+        simulation, scene = self._simulation, self.scene
+        diverged = simulation.failed("diverged")
+        if not diverged:
+            full = simulation.failed("overflow")
+            raise ContactOverflow(
+                f"worlds {full}: two bodies have more than eight touching particle pairs a "
+                "particle; they overlap deeply, or Fidelity.skin is too wide"
+            )
+        world = diverged[0]
+        if self.features.varied:
+            scene = with_parameters(scene, simulation.parameters.pick([world]))
+        status, model = simulation.state.world[world], simulation.model.of_world(world)
+        cause = cause_of_divergence(
+            scene, self.fidelity, model, self.features, simulation.last_substep
         )
-
-    def _raise_diverged(self, h: float, worlds: list[int]) -> None:
-        world = worlds[0]
-        scene = self.scene
-        if self._features.varied:
-            scene = with_parameters(scene, self._parameters.pick([world]))
-        model = self._model.of_world(world)
-        cause = cause_of_divergence(scene, self.fidelity, model, self._features, h)
         raise SimulationDiverged(
-            world,
-            int(self._state.world["diverged"][world]) - 1,
-            float(self._state.world["time"][world]),
-            cause,
-            worlds,
+            world, int(status["diverged"]) - 1, float(status["time"]), cause, diverged
         )
 
     def _settle(self) -> None:
-        """Brings candidates and forces up to a state that was set from outside, for a look at it.
-
-        Such worlds stay marked: their first step works the forces out under its own commands, so
-        that looking changes no bit.
-        """
-        if self._settled:
-            return
-        stale = self._state.world["stale"] != 0
-        if stale.any():
-            try:
-                self._run(self.fidelity.substep, 0, stale)
-            finally:
-                self._state.world["stale"][stale] = 1
-        self._settled = True
+        """Brings candidates and forces up to a state that was set from outside."""
+        if not self._simulation.settle():
+            self._raise_failure()
 
     # --- writing ------------------------------------------------------------------------------
 
     def _mask(self, worlds: Any) -> Array:
         if worlds is None:
-            return self._everyone
+            return self._simulation.everyone
         mask = np.ascontiguousarray(worlds)
         if mask.dtype != bool or mask.shape != (self.count,):
             raise ValueError(
@@ -241,7 +144,7 @@ class World(Variation):
 
     def reset(self, worlds: Any = None) -> None:
         """Puts worlds back into the scene's state at time zero; all of them, or a mask [count]."""
-        self._reset(self._mask(worlds))
+        self._simulation.reset(self._mask(worlds))
 
     def set_state(
         self,
@@ -271,18 +174,6 @@ class World(Variation):
             ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero,
                 fingers of a gripper apart in x or z. The state is then as it was.
         """
-        mask = self._mask(worlds)
-        chosen, bodies = int(mask.sum()), self._bodies
-        drives = len(self.scene.tools)
-        sizes = {
-            "position": (bodies, 3),
-            "orientation": (bodies, 4),
-            "linear_velocity": (bodies, 3),
-            "angular_velocity": (bodies, 3),
-            "drive_position": (drives, 3),
-            "drive_velocity": (drives, 3),
-            "time": (),
-        }
         given = {
             "position": position,
             "orientation": orientation,
@@ -292,62 +183,7 @@ class World(Variation):
             "drive_velocity": drive_velocity,
             "time": time,
         }
-        new = {
-            name: array(name, value, (chosen, *sizes[name]))
-            for name, value in given.items()
-            if value is not None
-        }
-        if "orientation" in new:
-            # of the largest entry first: squares of large ones overflow
-            largest = np.abs(new["orientation"]).max(axis=-1, keepdims=True)
-            if np.any(largest < 1e-12):
-                raise ValueError(
-                    "orientation holds a quaternion of length zero; no rotation is (0, 0, 0, 1)"
-                )
-            turn = new["orientation"] / largest
-            new["orientation"] = turn / np.sqrt(np.sum(turn**2, axis=-1, keepdims=True))
-        spins = np.any(new.get("angular_velocity", 0.0))
-        if self._features.rotation == NO_ROTATION and spins:
-            raise ValueError(
-                "angular_velocity must be zero in a scene of frictionless balls at rest, where "
-                "rotation isn't simulated; give a body its spin in the Scene"
-            )
-        for name in ("drive_position", "drive_velocity"):
-            for first, _ in self.scene.grippers if name in new else ():
-                one, other = new[name][:, first, ::2], new[name][:, first + 1, ::2]
-                if np.any(one != other):
-                    raise ValueError(
-                        f"{name} must have the same x and z for both fingers of a gripper, tools "
-                        f"{first} and {first + 1}, which are one solid along these axes"
-                    )
-        state = self._state
-        # what isn't given stays: the spin, not its momentum, where only the orientation changes
-        spin = new.get("angular_velocity")
-        if spin is None and "orientation" in new:
-            turning = state.mover["angular_momentum"][mask].any()
-            spin = self.angular_velocity[mask] if turning else None
-        if "position" in new:
-            state.mover["position"][mask, :bodies] = new["position"]
-        if "orientation" in new:
-            state.mover["orientation"][mask, :bodies] = new["orientation"]
-        if "linear_velocity" in new:
-            inverse = self._of_bodies("inverse_mass", np.flatnonzero(mask))
-            state.mover["momentum"][mask, :bodies] = new["linear_velocity"] / inverse[..., None]
-        if spin is not None:
-            turn = state.mover["orientation"][mask, :bodies]
-            state.mover["angular_momentum"][mask, :bodies] = spin_momentum(
-                self._of_bodies("inertia", np.flatnonzero(mask)), turn, spin
-            )
-        if "drive_position" in new:
-            state.mover["position"][mask, bodies:] = new["drive_position"]
-            state.mover["reference"][mask, bodies:] = new["drive_position"]
-            state.mover["reference_velocity"][mask, bodies:] = 0.0
-        if "drive_velocity" in new:
-            inverse = self._base.mover["inverse_mass"][bodies:, None]
-            state.mover["momentum"][mask, bodies:] = new["drive_velocity"] / inverse
-        if "time" in new:
-            state.world["time"][mask] = new["time"]
-        self._forget(mask)
+        write_state(self._simulation, given, self._mask(worlds))
 
     def command_drives(self, velocity: Any) -> None:
         """Lets every tool's reference move from where the tool is now, at a velocity.
@@ -357,8 +193,9 @@ class World(Variation):
         """
         shape = (self.count, len(self.scene.tools), 3)
         checked = array("velocity", velocity, shape)
-        make_command()(self._state.mover, self._bodies, by_worlds(checked))
-        self._table_valid = self._settled = False
+        simulation = self._simulation
+        make_command()(simulation.state.mover, simulation.bodies, by_worlds(checked))
+        simulation.changed()
 
     def move_drives(self, target: Any, time: float) -> None:
         """Lets every tool's reference move from where the reference is now to a target.
@@ -372,13 +209,83 @@ class World(Variation):
         shape = (self.count, len(self.scene.tools), 3)
         checked = array("target", target, shape)
         time = positive("time", time)
-        make_lead()(self._state.mover, self._bodies, by_worlds(checked), time)
-        self._settled = False
+        simulation = self._simulation
+        make_lead()(simulation.state.mover, simulation.bodies, by_worlds(checked), time)
+        simulation.changed(poses=False)
+
+    # --- parameters ---------------------------------------------------------------------------
+
+    @property
+    def parameters(self) -> Parameters:
+        """A copy of the bodies' parameters, [count, bodies] each."""
+        shape = (self.count, len(self.scene.bodies))
+        own = self._simulation.parameters
+        return Parameters(*(np.broadcast_to(values, shape).copy() for values in own))
+
+    def check_parameters(self, ranges: Mapping[str, Any]) -> None:
+        """Refuses ranges that hold parameters which the step is too long for.
+
+        The ends of the ranges are looked at: all bodies at one, and each in turn at the other.
+        What `set_parameters` writes within ranges that were checked needs no check of its own.
+
+        Args:
+            ranges: low and high of "mass", "friction", "restitution" or "size": numbers, or
+                [bodies] each. What isn't named is as in the scene.
+
+        Raises:
+            TypeError, ValueError: no such parameter, or no such range; a range that is unstable or
+                lets a body sink, with what binds and the largest safe step.
+        """
+        low, high = check_ranges(ranges, Parameters.of(self.scene))
+        self._limits.check_range(low, high, self._allow_unstable)
+
+    def set_parameters(
+        self,
+        *,
+        mass: Any = None,
+        friction: Any = None,
+        restitution: Any = None,
+        size: Any = None,
+        worlds: Any = None,
+    ) -> None:
+        """Gives the chosen worlds parameters of their own, and clears what is hidden in them.
+
+        Positions and velocities stay; `reset` and `set_state` then start from the new parameters
+        to the last bit. `reset` keeps parameters, `snapshot` holds them.
+
+        Args:
+            mass: kg, [chosen, bodies] or what broadcasts to it, as the others.
+            friction: of the bodies' material.
+            restitution: of the bodies' material, 0 to 1.
+            size: factor of every length of a body's shape, 1 as in the scene. A body keeps the
+                samples that it has there, so sizes can't be worlds apart.
+            worlds: mask [count] of the chosen worlds; all if None.
+
+        Raises:
+            ValueError: the World isn't `varied`; a wrong shape, a value out of its limits, or one
+                that the step is too long for. The parameters are then as they were.
+        """
+        if not self.features.varied:
+            raise ValueError(
+                "set_parameters needs worlds that may differ: build the World with varied=True"
+            )
+        mask = self._mask(worlds)
+        chosen = np.flatnonzero(mask)
+        given = {"mass": mass, "friction": friction, "restitution": restitution, "size": size}
+        values = check_values(given, chosen, len(self.scene.bodies))
+        if not values or not len(chosen):
+            return
+        new = self._simulation.parameters.pick(mask)._replace(**values)
+        if not self._allow_unstable:
+            self._limits.check(new, chosen)
+        self._simulation.vary_bodies(mask, new)
+
+    # --- saving -------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
         """Everything the worlds hold; `restore` continues from it to the last bit."""
-        own = self.parameters if self._features.varied else None
-        return Snapshot(self.scene, self.fidelity, copy_state(self._state), own)
+        own = self.parameters if self.features.varied else None
+        return Snapshot(self.scene, self.fidelity, copy_state(self._simulation.state), own)
 
     def restore(self, saved: Snapshot) -> None:
         """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
@@ -392,29 +299,161 @@ class World(Variation):
             what = f"fidelity: {', '.join(fields)}"
         elif saved.scene != self.scene:
             what = "scene"
-        elif (saved.parameters is not None) != self._features.varied:
+        elif (saved.parameters is not None) != self.features.varied:
             what = f"varied: {saved.parameters is not None}"
         else:
             what = ""
         if what:
             raise ValueError(f"saved must be of the same worlds; it has another {what}")
+        simulation = self._simulation
         if saved.parameters is not None:
-            pairs = zip(self._parameters, saved.parameters, strict=True)
+            pairs = zip(simulation.parameters, saved.parameters, strict=True)
             other = np.any([np.any(mine != theirs, axis=1) for mine, theirs in pairs], axis=0)
-            self._write_parameters(other, saved.parameters.pick(other))
-        for mine, theirs in zip(self._state, saved.state, strict=True):
+            simulation.write_parameters(other, saved.parameters.pick(other))
+        for mine, theirs in zip(simulation.state, saved.state, strict=True):
             mine[...] = theirs
-        self._table_valid = self._settled = False
+        simulation.changed()
 
-    def _find_kernels(self) -> None:
-        self._advance = make_advance(self._features)
-        self._readout = make_readout(self._features)
+    # --- reading ------------------------------------------------------------------------------
 
-    def __getstate__(self) -> dict[str, Any]:
-        """All but the kernels, which are found again by the features."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_advance", "_readout")}
+    @property
+    def features(self) -> Features:
+        """What was compiled in for this scene."""
+        return self._simulation.features
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Takes the attributes back and finds the kernels."""
-        self.__dict__.update(state)
-        self._find_kernels()
+    @property
+    def time(self) -> Array:
+        """[count] s, read-only."""
+        return read_only(self._simulation.state.world["time"])
+
+    @property
+    def position(self) -> Array:
+        """[count, bodies, 3] m, centres of mass: a read-only view that follows the state."""
+        return read_only(self._simulation.state.mover["position"][:, : self._simulation.bodies])
+
+    @property
+    def orientation(self) -> Array:
+        """[count, bodies, 4] unit quaternions x y z w: a read-only view that follows the state."""
+        return read_only(self._simulation.state.mover["orientation"][:, : self._simulation.bodies])
+
+    @property
+    def linear_velocity(self) -> Array:
+        """[count, bodies, 3] m/s, world frame."""
+        momentum = self._simulation.state.mover["momentum"][:, : self._simulation.bodies]
+        return read_only(momentum * self._simulation.of_bodies("inverse_mass")[..., None])
+
+    @property
+    def angular_velocity(self) -> Array:
+        """[count, bodies, 3] rad/s, world frame."""
+        return read_only(self._simulation.angular_velocity())
+
+    @property
+    def drive_position(self) -> Array:
+        """[count, tools, 3] m: a read-only view that follows the state."""
+        return read_only(self._simulation.state.mover["position"][:, self._simulation.bodies :])
+
+    @property
+    def drive_velocity(self) -> Array:
+        """[count, tools, 3] m/s, world frame."""
+        bodies = self._simulation.bodies
+        inverse = self._simulation.base.mover["inverse_mass"][bodies:]
+        momentum = self._simulation.state.mover["momentum"][:, bodies:]
+        return read_only(momentum * inverse[:, None])
+
+    @property
+    def drive_reference(self) -> Array:
+        """[count, tools, 3] m, where the servos pull to: a read-only view of the state."""
+        return read_only(self._simulation.state.mover["reference"][:, self._simulation.bodies :])
+
+    def read(self) -> Readout:
+        """All poses and velocities as they are now, drives after the bodies: read-only."""
+        return self._simulation.readout()
+
+    def kinetic_energy(self) -> Array:
+        """[count] J of the bodies, translation and rotation."""
+        return energies.kinetic_energy(self._simulation)
+
+    def potential_energy(self) -> Array:
+        """[count] J of the bodies in the field of gravity, zero at the origin."""
+        return energies.potential_energy(self._simulation)
+
+    def linear_momentum(self) -> Array:
+        """[count, 3] kg m/s of the bodies."""
+        return energies.linear_momentum(self._simulation)
+
+    def angular_momentum(self) -> Array:
+        """[count, 3] kg m^2/s of the bodies about the origin."""
+        return energies.angular_momentum(self._simulation)
+
+    def penetration(self) -> Array:
+        """[count] m, deepest overlap now; 0 where nothing touches."""
+        self._settle()
+        simulation = self._simulation
+        return diagnostics.penetration(simulation.model, self.features, simulation.state)
+
+    def contacts(self, world: int = 0) -> Contacts:
+        """Who touches what in one world, where and how hard."""
+        self._settle()
+        simulation, index = self._simulation, self._world_index(world)
+        return diagnostics.contacts(simulation.model, self.features, simulation.state, index)
+
+    def samples(self, solid: int) -> tuple[Array, float | Array]:
+        """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m.
+
+        Of a Compound whose samples differ in it, their radii [n]. A solid that others only touch
+        with theirs, as the ground, has none.
+
+        Args:
+            solid: its index, as in `first_touch`.
+        """
+        return diagnostics.samples(self._simulation.base, self._solids.index("solid", solid))
+
+    def first_touch(self, first: int, second: int) -> Array:
+        """[count] s, when two solids first touched since their state was set; NaN before.
+
+        Args:
+            first: index of a solid: bodies, then tools, then statics, each in scene order.
+            second: another.
+        """
+        sides = self._solids.pair(first, second)[2]
+        self._settle()
+        return diagnostics.first_touch(self._simulation.state, sides)
+
+    def first_touch_position(self, first: int, second: int) -> Array:
+        """[count, 3] m, where the centre of one of two solids was at their first touch; NaN before.
+
+        Args:
+            first: index of the solid whose position is told, as in `first_touch`.
+            second: another, that comes after it.
+        """
+        one, other, sides = self._solids.pair(first, second)
+        if one > other:
+            raise ValueError(
+                f"first must come before second, whose position isn't kept: got {one} and {other}"
+            )
+        self._settle()
+        return diagnostics.first_touch_position(self._simulation.state, sides)
+
+    def pressing(self, first: int, second: int) -> Array:
+        """[count] N, the sum of the normal forces between two solids, as in `first_touch`."""
+        sides = self._solids.pair(first, second)[2]
+        self._settle()
+        return diagnostics.pressing(self._simulation.state, sides)
+
+    def largest_stable_step(self, world: int = 0) -> float:
+        """Largest stable step in s with the contacts that a world has now; inf without any."""
+        self._settle()
+        simulation, index = self._simulation, self._world_index(world)
+        return stability.of_contacts(simulation.model, self.features, simulation.state, index)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of state a world, beyond the shared model; of varied worlds with their own."""
+        own = self._simulation.model.nbytes if self.features.varied else 0
+        return (self._simulation.state.nbytes + own) // self.count
+
+    def _world_index(self, world: int) -> int:
+        index = integer("world", world, low=0)
+        if index >= self.count:
+            raise ValueError(f"world must be below {self.count}, got {world!r}")
+        return index

@@ -112,7 +112,7 @@ def test_a_contact_lasts_half_a_period_and_sinks_v_over_omega():
 def test_a_cube_sinks_as_deep_however_many_samples_it_has(spacing, samples):
     fidelity = Fidelity(spacing=spacing)
     world = settled(scenes.block_on_ground(), fidelity)
-    assert world._model.side["sample_count"].tolist() == [samples]
+    assert world._simulation.model.side["sample_count"].tolist() == [samples]
     stiffness = 0.1 * (fidelity.contact_resolution / fidelity.substep) ** 2
     sink = closed_forms.resting_overlap(0.1 * GRAVITY, stiffness)
     assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=1e-6)

@@ -78,7 +78,7 @@ def varied(scene, fidelity="balanced", count=COUNT, threads=1, **values):
 
 def everything_of(world, i):
     """All arrays of one world's state, field by field."""
-    state, (group, lane) = world._state, divmod(i, LANES)
+    state, (group, lane) = world._simulation.state, divmod(i, LANES)
     for table in (state.mover[i], state.side[i], state.world[i]):
         yield from (table[name] for name in table.dtype.names)
     yield state.touch[..., i]
@@ -252,7 +252,7 @@ def test_what_is_carried_over_continues_to_the_last_bit(way):
 
 def test_worlds_that_are_alike_share_one_model():
     scene = scenes.push_like()
-    alike = [World(scene, count=n)._model.nbytes for n in (1, 800)]
+    alike = [World(scene, count=n)._simulation.model.nbytes for n in (1, 800)]
     assert alike[0] == alike[1]
     assert not World(scene).features.varied
     assert World(scene, varied=True).features.varied

@@ -43,7 +43,7 @@ def thrown(count, threads=None, order=slice(None)):
 
 def digests(world):
     """A hash of all bytes of each world's state, hidden ones included."""
-    state = world._state
+    state = world._simulation.state
 
     def parts(w):
         group, lane = divmod(w, LANES)
@@ -308,7 +308,7 @@ def test_setting_a_state_forgets_what_is_hidden():
         world.set_state(**state)
         world.command_drives((0.1, 0.0, 0.0))
         world.advance(0.1)
-    np.testing.assert_array_equal(used._state.mover, fresh._state.mover)
+    np.testing.assert_array_equal(used.snapshot().state.mover, fresh.snapshot().state.mover)
 
 
 @pytest.mark.parametrize(
@@ -362,7 +362,9 @@ def test_reset_brings_the_masked_worlds_back_to_the_start():
     world.advance(0.1)
     start.advance(0.1)
     for w in range(3):
-        np.testing.assert_array_equal(world._state.mover[w], start._state.mover[0])
+        np.testing.assert_array_equal(
+            world.snapshot().state.mover[w], start.snapshot().state.mover[0]
+        )
 
 
 # --- saving -------------------------------------------------------------------------------------
@@ -495,7 +497,7 @@ def test_a_feature_that_is_not_needed_changes_no_bit():
     for world in worlds:
         world.advance(1.0)
     for name in ("position", "orientation", "momentum", "angular_momentum", "force", "torque"):
-        first, second = (w._state.mover[name][0, 0] for w in worlds)
+        first, second = (w.snapshot().state.mover[name][0, 0] for w in worlds)
         np.testing.assert_array_equal(first, second, err_msg=name)
 
 
@@ -506,7 +508,7 @@ def test_a_distant_body_of_another_kind_changes_no_bit():
     worlds = [World(plain), World(dataclasses.replace(plain, bodies=bodies[:1]))]
     for world in worlds:
         world.advance(1.0)
-    first, second = (w._state.mover[0, 0] for w in worlds)
+    first, second = (w.snapshot().state.mover[0, 0] for w in worlds)
     for name in ("position", "orientation", "momentum", "angular_momentum"):
         np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
@@ -606,7 +608,9 @@ def test_a_diverging_world_is_named_and_the_others_go_on():
     twin.advance(0.2)
     others = [0, 1, 2, 4]
     for w in others:
-        np.testing.assert_array_equal(world._state.mover[w], twin._state.mover[w])
+        np.testing.assert_array_equal(
+            world.snapshot().state.mover[w], twin.snapshot().state.mover[w]
+        )
     # it stays reported until it is brought back, and the others stay whole
     with pytest.raises(SimulationDiverged):
         world.advance(0.02)
@@ -615,7 +619,9 @@ def test_a_diverging_world_is_named_and_the_others_go_on():
     world.advance(0.02)
     twin.advance(0.02)
     for w in others:
-        np.testing.assert_array_equal(world._state.mover[w], twin._state.mover[w])
+        np.testing.assert_array_equal(
+            world.snapshot().state.mover[w], twin.snapshot().state.mover[w]
+        )
     assert np.all(np.isfinite(world.position))
 
 
