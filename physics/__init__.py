@@ -4,11 +4,14 @@ from physics.analysis.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged
 from physics.model.features import Features
 from physics.scene.compound import Compound
+from physics.scene.drives import Drive, Gripper
 from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.material import Material
 from physics.scene.parameters import Parameters
 from physics.scene.part import Part
-from physics.scene.scene import Body, Drive, Gripper, Ground, Material, Scene, Static
+from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Capsule, Sphere
+from physics.scene.solids import Body, Ground, Static
 from physics.step.readout import Readout
 from physics.world import Snapshot, World
 

@@ -1,18 +1,24 @@
-"""How kernels are compiled: the only file that names numba options.
+"""How kernels are compiled: only this file and `compiled_once` know numba's options.
 
-Two kinds of compiled function exist. A `kernel` is inlined or linked into whatever calls it and is
-never called from Python. An `entry` is called from Python, releases the GIL and is cached on disk.
+There are three kinds of compiled functions:
+- a `stage` is inlined into its caller: a stage of the substep, or a formula in its loop over lanes;
+- a `kernel` is linked into its caller: what is called seldom, or from several places;
+- an `entry` is called from Python, releases the GIL and is cached on disk.
 
 Numba's cache notices edits of the file that defines an entry, but not of the kernels that it calls.
-Every entry therefore captures `SOURCES`, a hash of all sources of this package, in its closure:
-numba hashes closure cells, so an edit anywhere in the package is a miss, and nothing stale runs.
+So every entry captures `SOURCES`, a hash of all code of this package, in its closure: numba hashes
+closure cells, and an edit anywhere in the package is a cache miss. Comments and docstrings don't
+count.
 
-Floating-point licence: `contract` (fused multiply-add) and no other. Every world runs the same
-instructions in a vector lane of its own, so its result is the same to the last bit whatever runs in
-the other lanes; NaN and infinity keep their meaning.
+The only floating-point licence is `contract` (fused multiply-add). Every world runs the same
+instructions in its own vector lane, so its result is bitwise independent of the other lanes; NaN
+and infinity keep their meaning.
 """
 
+import ast
 import hashlib
+import logging
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -24,48 +30,64 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
+from physics.compiled_once import Linked
+
 Array = np.ndarray
 
+# "compiling ..." when a kernel isn't in the cache, and how long it took
+LOGGER = logging.getLogger("physics")
+
 _PACKAGE = Path(__file__).parent
+
+
+def _code(source: str) -> str:
+    """The syntax tree of a source, without docstrings and positions."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if not isinstance(body, list) or not body or not isinstance(body[0], ast.Expr):
+            continue
+        if isinstance(body[0].value, ast.Constant) and isinstance(body[0].value.value, str):
+            del body[0]
+    return ast.dump(tree)
 
 
 def _hash_sources() -> int:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*.py")):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode())
-        digest.update(path.read_bytes())
+        digest.update(_code(path.read_text(encoding="utf-8")).encode())
     return int.from_bytes(digest.digest()[:7], "big")
 
 
 SOURCES: int = _hash_sources()
 
-# Worlds that a kernel works on side by side, one to a vector lane. Sixteen are two vectors of
-# AVX-512 or four of AVX2. LLVM checks before every run of a loop that its arrays don't overlap,
-# and thinks one of fewer turns too short to be worth it; and vectors that don't wait for each
-# other hide how long a root or a division takes
+# Worlds that a kernel works on side by side, one per vector lane: two vectors of AVX-512 or four of
+# AVX2. LLVM checks before every run of a loop that its arrays don't overlap, and doesn't vectorise
+# shorter loops; and independent vectors hide the latency of roots and divisions
 LANES = 16
 
-# Without reference counts: numba would count all arrays of a model and a state up and down, with
-# atomic instructions, wherever control flow is too rich for it to see that this is idle. The
-# price is that kernels can't allocate; scratch arrays come from Python.
+# Without reference counts (`_nrt`): numba would count all arrays of a model and a state with atomic
+# instructions. The price is that kernels can't allocate; working memory comes from Python
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
-_INLINE: Any = {"forceinline": True, **_OPTIONS}
+_LINKED: Any = {"pipeline_class": Linked, "no_cfunc_wrapper": True, **_OPTIONS}
+_INLINE: Any = {"forceinline": True, **_LINKED}
 
 
 def kernel(function: Any) -> Any:
-    """A function on scalars, or one that is called seldom: compiled by itself."""
-    return register_jitable(**_OPTIONS)(function)
+    """Links a function into what calls it; never called from Python."""
+    return register_jitable(**_LINKED)(function)
 
 
 def stage(function: Any) -> Any:
-    """A stage, or a formula in its loop over lanes: merged into its caller."""
+    """Inlines a function into what calls it; never called from Python."""
     return register_jitable(**_INLINE)(function)
 
 
 def at(value: Any, i: int) -> Any:
-    """A constant in lane i: the number itself, or the entry of an array with one for each lane.
+    """A constant in lane i: the number itself, or the entry of an array with one per lane.
 
-    Which of them is settled by the type: for a number, nothing of this remains in the code.
+    The type decides, so for a number nothing of this remains in the compiled code.
     """
     return value[i] if isinstance(value, np.ndarray) else value
 
@@ -78,7 +100,16 @@ def _at(value: Any, i: Any) -> Any:
 
 
 def entry(function: Any) -> Any:
-    """A function that Python calls: cached on disk, free of the GIL."""
+    """A function that Python calls: cached on disk, without the GIL."""
+    return _entry(function, logging.INFO)
+
+
+def large_entry(function: Any) -> Any:
+    """An entry that takes seconds to compile: logged as a warning, which shows by default."""
+    return _entry(function, logging.WARNING)
+
+
+def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return _on_records(function)
     compiled = njit(cache=True, nogil=True, **_OPTIONS)(function)
@@ -86,12 +117,12 @@ def entry(function: Any) -> Any:
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
-        # Callers see to it that an entry's arguments always have the same types and layout. Asking
-        # for those of a dozen arrays of records at every call would take 3 microseconds, a fifth of
-        # a single world's frame.
+        # An entry's arguments always have the same types and layout. Looking up the types of a
+        # dozen record arrays at every call would take 3 us, a fifth of a single world's frame
         if direct:
             return direct[0](*arguments)
-        result = compiled(*arguments)
+        with event.install_listener("numba:compile", _Announcement(compiled, level)):
+            result = compiled(*arguments)
         direct.append(compiled.get_overload(tuple(map(typeof, arguments))))
         return result
 
@@ -99,28 +130,48 @@ def entry(function: Any) -> Any:
     return call
 
 
-class _Listener(event.Listener):
-    """Calls back when a kernel begins to be compiled; one from the disk needs none of it."""
+class _Announcement(event.Listener):
+    """Logs when an entry starts to compile, and when it is done; silent if it is in the cache."""
 
-    def __init__(self, tell: Callable[[str], object]) -> None:
-        self.tell = tell
+    def __init__(self, compiled: Any, level: int) -> None:
+        self._compiled, self._level = compiled, level
+        self._start = 0.0
 
     def on_start(self, event: Any) -> None:
-        self.tell(event.data["dispatcher"].py_func.__name__)
+        if event.data["dispatcher"] is self._compiled:
+            self._start = time.perf_counter()
+            name = self._compiled.py_func.__name__
+            LOGGER.log(self._level, "compiling kernel %r; later runs load it from a cache", name)
+
+    def on_end(self, event: Any) -> None:
+        if event.data["dispatcher"] is self._compiled:
+            seconds = time.perf_counter() - self._start
+            name = self._compiled.py_func.__name__
+            LOGGER.log(self._level, "compiled kernel %r in %.1f s", name, seconds)
+
+
+class _Listener(event.Listener):
+    """Calls back when a kernel starts to compile; not for one that comes from the cache."""
+
+    def __init__(self, report: Callable[[str], object]) -> None:
+        self.report = report
+
+    def on_start(self, event: Any) -> None:
+        self.report(event.data["dispatcher"].py_func.__name__)
 
     def on_end(self, event: Any) -> None:
         pass
 
 
 @contextmanager
-def telling(tell: Callable[[str], object]) -> Iterator[None]:
-    """Within it, `tell` is called with the name of each function that begins to be compiled."""
-    with event.install_listener("numba:compile", _Listener(tell)):
+def on_compile(report: Callable[[str], object]) -> Iterator[None]:
+    """Calls `report` with the name of each function that starts to compile within the context."""
+    with event.install_listener("numba:compile", _Listener(report)):
         yield
 
 
 def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
-    """Zeros that begin at a cache line, as vectors of LANES doubles should."""
+    """Zeros that start at a cache line, as vectors of LANES doubles should."""
     line = 64
     size = int(np.prod(shape)) * dtype.itemsize
     room = np.zeros(size + line, dtype=np.uint8)
@@ -131,8 +182,8 @@ def aligned_zeros(shape: int | tuple[int, ...], dtype: np.dtype) -> Array:
 def columns(shape: tuple[int, ...], count: int, dtype: Any) -> Array:
     """An empty array [*shape, count or a little more]: a column of worlds for each quantity.
 
-    Columns are an odd number of cache lines long. Else those of a power of two of worlds would all
-    begin in the same few sets of the cache, and writing a world's quantities would drive them out.
+    Columns are an odd number of cache lines long. With a power of two of worlds they would all
+    start in the same few sets of the cache, and writing a world's quantities would evict them.
     """
     item = np.dtype(dtype).itemsize
     lines = -(-count * item // 64) | 1

@@ -1,9 +1,9 @@
-"""Rotations: unit quaternions (x, y, z, w), rotation matrices, and how they move.
+"""Rotations: unit quaternions (x, y, z, w), rotation matrices, and their time derivatives.
 
-With angular velocity in the world frame and the lecture's own conventions (r' = omega x r,
+With the angular velocity in the world frame and the conventions of the lecture (r' = omega x r,
 J = R J0 R^T), the quaternion moves as q' = 1/2 omega (x) q. The matrix Q printed in the lesson
 is q (x) omega, which belongs to a body-frame omega; the vector part's cross product has the other
-sign here. tests/physics/test_rotation.py checks this against the matrix equation R' = omega x R.
+sign here. test_rotation.py checks this against the matrix equation R' = omega x R.
 """
 
 import math
@@ -34,8 +34,8 @@ def rotation_entries(x, y, z, w):
     )
 
 
-# rad: up to here the series of `turn` is exact to round-off
-SMALL_TURN = 0.3
+# rad: up to here the series of `rotate_quaternion` is exact to round-off
+SMALL_ROTATION = 0.3
 
 
 @stage
@@ -50,11 +50,11 @@ def _composed(x, y, z, w, px, py, pz, c):
 
 
 @stage
-def turn(x, y, z, w, ax, ay, az):
-    """Quaternion after a turn by the world-frame rotation vector (ax, ay, az), in rad.
+def rotate_quaternion(x, y, z, w, ax, ay, az):
+    """Quaternion after a rotation by the world-frame rotation vector (ax, ay, az), in rad.
 
-    The exponential map exp(a/2) (x) q, for angles up to SMALL_TURN: the series of sin(s)/s and
-    cos(s) to s^10 cost no branch and no trigonometry, so worlds turn side by side.
+    The exponential map exp(a/2) (x) q, for angles up to SMALL_ROTATION: the series of sin(s)/s
+    and cos(s) to s^10 need no branch and no trigonometric function, so LLVM can vectorise them.
     """
     s2 = 0.25 * (ax * ax + ay * ay + az * az)
     k = 0.5 - s2 * (0.5 / 6) * (1.0 - s2 * (1 / 20) * (1.0 - s2 * (1 / 42) * (1.0 - s2 * (1 / 72))))
@@ -65,8 +65,8 @@ def turn(x, y, z, w, ax, ay, az):
 
 
 @kernel
-def turn_far(x, y, z, w, ax, ay, az):
-    """As `turn`, by an angle of any size above zero."""
+def rotate_quaternion_far(x, y, z, w, ax, ay, az):
+    """As `rotate_quaternion`, by an angle of any size above zero."""
     s = 0.5 * math.sqrt(ax * ax + ay * ay + az * az)
     k = 0.5 * math.sin(s) / s
     return _composed(x, y, z, w, k * ax, k * ay, k * az, math.cos(s))
@@ -87,17 +87,17 @@ def rotation_matrix(quaternion: Array) -> Array:
 
 
 def rotate(quaternion: Array, vector: Array) -> Array:
-    """Vectors [..., 3] turned from the body frame into the world frame by quaternions [..., 4]."""
+    """Vectors [..., 3] rotated from the body frame into the world frame by quaternions [..., 4]."""
     return np.einsum("...ij,...j->...i", rotation_matrix(quaternion), vector)
 
 
 def rotate_back(quaternion: Array, vector: Array) -> Array:
-    """Vectors [..., 3] turned from the world frame into the body frame by quaternions [..., 4]."""
+    """Vectors [..., 3] rotated from the world frame into the body frame by quaternions [..., 4]."""
     return np.einsum("...ji,...j->...i", rotation_matrix(quaternion), vector)
 
 
 def multiply(p: Array, q: Array) -> Array:
-    """Hamilton product p (x) q of quaternions [..., 4], x y z w: first q's turn, then p's."""
+    """Hamilton product p (x) q of quaternions [..., 4], x y z w: first q's rotation, then p's."""
     px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
     qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
     return np.stack(
@@ -128,13 +128,13 @@ def from_rotation_vector(vector: Array) -> Array:
 
 
 def from_yaw(yaw: Array) -> Array:
-    """Unit quaternions [..., 4] of turns about the world's z axis by yaw [...] in rad."""
+    """Unit quaternions [..., 4] of rotations about the world's z axis by yaw [...] in rad."""
     yaw = np.asarray(yaw, dtype=float)
     zero = np.zeros_like(yaw)
     return np.stack([zero, zero, np.sin(0.5 * yaw), np.cos(0.5 * yaw)], axis=-1)
 
 
 def yaw(quaternion: Array) -> Array:
-    """Yaw in rad of unit quaternions [..., 4]: the turn about z in the order z, y, x."""
+    """Yaw in rad of unit quaternions [..., 4]: the rotation about z in the order z, y, x."""
     x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -14,11 +14,11 @@ from physics.errors import ContactOverflow, SimulationDiverged
 from physics.model.features import Features
 from physics.model.state import State
 from physics.model.state import copy as copy_state
-from physics.motion.drive_commands import by_worlds, make_command, make_lead
+from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.scene.fidelity import Fidelity, resolve
 from physics.scene.parameters import Parameters, check_ranges, check_values, with_parameters
 from physics.scene.scene import Scene
-from physics.scene.validation import array, instance, integer, positive
+from physics.scene.validation import array, instance, integer, positive, text
 from physics.step.readout import Readout
 from physics.step.simulation import Simulation, read_only
 from physics.step.threads import check_threads
@@ -28,12 +28,12 @@ Array = np.ndarray
 
 
 class Snapshot(NamedTuple):
-    """Everything that worlds hold, hidden contact state included, and what they are worlds of."""
+    """The complete state of worlds, hidden contact state included, and their scene and fidelity."""
 
     scene: Scene
     fidelity: Fidelity
     state: State
-    parameters: Parameters | None = None  # of varied worlds
+    parameters: Parameters | None = None  # of worlds with per-world parameters
 
 
 class World:
@@ -43,13 +43,14 @@ class World:
         scene: what is in each world.
         fidelity: a preset's name or a Fidelity.
         count: number of worlds, at least 1.
-        threads: to share the worlds out over; all cores if None. Results don't depend on it.
-        allow_unstable: accept what makes the fidelity's step too long, see Raises.
-        varied: worlds may have masses, friction, restitution and sizes of their own, see
-            `set_parameters`. Worlds that are all alike go without, and are quicker.
+        threads: number of threads; all cores if None. Results don't depend on it.
+        allow_unstable: accept a scene for which the fidelity's substep is too long.
+        per_world_parameters: masses, friction, restitution and sizes may differ between worlds, see
+            `set_parameters`. Identical worlds are faster.
 
     Raises:
-        TypeError, ValueError: a bad argument; a step that is too long for the scene, see
+        TypeError: an argument of the wrong type.
+        ValueError: an argument out of range; a substep that is too long for the scene, see
             `physics.analysis.step_limits.check_step`.
     """
 
@@ -61,24 +62,26 @@ class World:
         threads: int | None = None,
         *,
         allow_unstable: bool = False,
-        varied: bool = False,
+        per_world_parameters: bool = False,
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene: Scene = instance("scene", scene, Scene)
         self.fidelity = resolve(fidelity)
         self.count = integer("count", count, low=1)
         self.threads = check_threads(threads)
-        varied = instance("varied", varied, bool)
+        per_world_parameters = instance("per_world_parameters", per_world_parameters, bool)
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
-        self._simulation = Simulation(scene, self.fidelity, self.count, self.threads, varied)
+        self._simulation = Simulation(
+            scene, self.fidelity, self.count, self.threads, per_world_parameters
+        )
         if not allow_unstable:
             check_step(scene, self.fidelity, self._simulation.base, self.features)
         self._limits = ParameterLimits(scene, self.fidelity)
-        self._solids = Solids(self._simulation.base)
+        self._solids = Solids(scene.solid_names, self._simulation.base)
         self._span = 0.0
 
     def __repr__(self) -> str:
-        """Names what the world is made of."""
+        """Names the contents of the world."""
         return (
             f"World({len(self.scene.bodies)} bodies, {len(self.scene.drives)} drives, "
             f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count})"
@@ -91,14 +94,14 @@ class World:
 
         Args:
             time: s.
-            worlds: mask [count] of the worlds to advance, the others stay as they are; all if None.
+            worlds: mask [count] of the worlds to advance; all if None.
 
         Raises:
             TypeError, ValueError: `time` isn't a positive finite number; a bad mask.
-            SimulationDiverged: a world turned non-finite; the others have advanced and are whole.
+            SimulationDiverged: a world became non-finite; the others have advanced.
             ContactOverflow: more particle pairs touch than there is room for.
         """
-        if type(time) is not float or time != self._span:  # frames are all of one length
+        if type(time) is not float or time != self._span:  # most frames have the same length
             self._span = positive("time", time)
         if not self._simulation.advance(self._span, self._mask(worlds)):
             self._raise_failure()
@@ -110,23 +113,23 @@ class World:
         if not diverged:
             full = simulation.failed("overflow")
             raise ContactOverflow(
-                f"worlds {full}: two bodies have more than eight touching particle pairs a "
+                f"worlds {full}: two bodies have more than eight touching pairs per "
                 "particle; they overlap deeply, or Fidelity.skin is too wide"
             )
         world = diverged[0]
-        if self.features.varied:
+        if self.features.per_world_parameters:
             scene = with_parameters(scene, simulation.parameters.pick([world]))
         status, model = simulation.state.world[world], simulation.model.of_world(world)
         cause = cause_of_divergence(
             scene, self.fidelity, model, self.features, simulation.last_substep
         )
-        raise SimulationDiverged(
-            world, int(status["diverged"]) - 1, float(status["time"]), cause, diverged
-        )
+        body = int(status["diverged"]) - 1
+        name = scene.solid_names[body]
+        raise SimulationDiverged(world, body, name, float(status["time"]), cause, diverged)
 
-    def _settle(self) -> None:
-        """Brings candidates and forces up to a state that was set from outside."""
-        if not self._simulation.settle():
+    def _refresh(self) -> None:
+        """Computes candidates and forces of a state that was set from outside."""
+        if not self._simulation.refresh():
             self._raise_failure()
 
     # --- writing ------------------------------------------------------------------------------
@@ -143,7 +146,7 @@ class World:
         return mask
 
     def reset(self, worlds: Any = None) -> None:
-        """Puts worlds back into the scene's state at time zero; all of them, or a mask [count]."""
+        """Resets worlds to the scene's state at time zero; all of them, or a mask [count]."""
         self._simulation.reset(self._mask(worlds))
 
     def set_state(
@@ -158,21 +161,21 @@ class World:
         time: Any = None,
         worlds: Any = None,
     ) -> None:
-        """Writes any part of the state of the chosen worlds, and clears what is hidden in them.
+        """Writes any part of the state of the chosen worlds, and clears their hidden contact state.
 
         Args:
-            position: m; [chosen, bodies, 3] or what broadcasts to it, as the others.
-            orientation: [chosen, bodies, 4] quaternions x y z w; they are normalised.
+            position: m; [chosen, bodies, 3] or what broadcasts to it, like all others.
+            orientation: [chosen, bodies, 4] quaternions x y z w; they are normalised, w >= 0.
             linear_velocity: m/s, [chosen, bodies, 3].
             angular_velocity: rad/s, world frame, [chosen, bodies, 3].
-            drive_position: m, [chosen, tools, 3].
-            drive_velocity: m/s, [chosen, tools, 3].
+            drive_position: m, [chosen, drives, 3].
+            drive_velocity: m/s, [chosen, drives, 3].
             time: [chosen] s.
             worlds: mask [count] of the chosen worlds; all if None.
 
         Raises:
-            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero,
-                fingers of a gripper apart in x or z. The state is then as it was.
+            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero, or
+                fingers of a gripper that differ in x or z. The state is then unchanged.
         """
         given = {
             "position": position,
@@ -186,31 +189,33 @@ class World:
         write_state(self._simulation, given, self._mask(worlds))
 
     def command_drives(self, velocity: Any) -> None:
-        """Lets every tool's reference move from where the tool is now, at a velocity.
+        """Moves the set point of every drive at a velocity, starting at the drive's position.
 
         Args:
-            velocity: [count, tools, 3] m/s, or what broadcasts to it; it holds until changed.
+            velocity: [count, drives, 3] m/s, or what broadcasts to it; it holds until the next
+                command. The two fingers of a gripper count as two drives.
         """
-        shape = (self.count, len(self.scene.tools), 3)
+        shape = (self.count, len(self.scene.driven_bodies), 3)
         checked = array("velocity", velocity, shape)
         simulation = self._simulation
-        make_command()(simulation.state.mover, simulation.bodies, by_worlds(checked))
+        make_velocity_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked))
         simulation.changed()
 
     def move_drives(self, target: Any, time: float) -> None:
-        """Lets every tool's reference move from where the reference is now to a target.
+        """Moves the set point of every drive from where it is to a target, and holds it there.
 
-        A tool that holds a load hangs behind its reference. From the reference on, it stays so.
+        A loaded drive lags behind its set point. Because the motion starts at the set point, the
+        lag doesn't add up over several commands.
 
         Args:
-            target: [count, tools, 3] m, or what broadcasts to it.
-            time: s in which it is reached, and after which a new command is due.
+            target: [count, drives, 3] m, or what broadcasts to it.
+            time: s, duration of the motion.
         """
-        shape = (self.count, len(self.scene.tools), 3)
+        shape = (self.count, len(self.scene.driven_bodies), 3)
         checked = array("target", target, shape)
         time = positive("time", time)
         simulation = self._simulation
-        make_lead()(simulation.state.mover, simulation.bodies, by_worlds(checked), time)
+        make_move_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked), time)
         simulation.changed(poses=False)
 
     # --- parameters ---------------------------------------------------------------------------
@@ -223,18 +228,19 @@ class World:
         return Parameters(*(np.broadcast_to(values, shape).copy() for values in own))
 
     def check_parameters(self, ranges: Mapping[str, Any]) -> None:
-        """Refuses ranges that hold parameters which the step is too long for.
+        """Raises an error if the substep is too long for parameters within ranges.
 
-        The ends of the ranges are looked at: all bodies at one, and each in turn at the other.
-        What `set_parameters` writes within ranges that were checked needs no check of its own.
+        The ends of the ranges are checked: all bodies at one end, and each in turn at the other.
+        Values within checked ranges are not checked again by `set_parameters`.
 
         Args:
-            ranges: low and high of "mass", "friction", "restitution" or "size": numbers, or
-                [bodies] each. What isn't named is as in the scene.
+            ranges: (low, high) of "mass", "friction", "restitution" or "size": numbers, or
+                [bodies] each. Parameters that aren't named are as in the scene.
 
         Raises:
-            TypeError, ValueError: no such parameter, or no such range; a range that is unstable or
-                lets a body sink, with what binds and the largest safe step.
+            TypeError, ValueError: no such parameter, or a bad range; a range in which the substep
+                is unstable or a body sinks. The message names the solid that limits the substep and
+                the largest safe one.
         """
         low, high = check_ranges(ranges, Parameters.of(self.scene))
         self._limits.check_range(low, high, self._allow_unstable)
@@ -248,26 +254,27 @@ class World:
         size: Any = None,
         worlds: Any = None,
     ) -> None:
-        """Gives the chosen worlds parameters of their own, and clears what is hidden in them.
+        """Sets the parameters of the chosen worlds, and clears their hidden contact state.
 
-        Positions and velocities stay; `reset` and `set_state` then start from the new parameters
-        to the last bit. `reset` keeps parameters, `snapshot` holds them.
+        Positions and velocities stay. After `reset` or `set_state` a world behaves bitwise as one
+        whose scene has these parameters. `reset` keeps parameters, `snapshot` includes them.
 
         Args:
-            mass: kg, [chosen, bodies] or what broadcasts to it, as the others.
+            mass: kg, [chosen, bodies] or what broadcasts to it, like all others.
             friction: of the bodies' material.
             restitution: of the bodies' material, 0 to 1.
-            size: factor of every length of a body's shape, 1 as in the scene. A body keeps the
-                samples that it has there, so sizes can't be worlds apart.
+            size: factor on every length of a body's shape, 1 as in the scene. The number of samples
+                stays, which limits how much sizes can differ.
             worlds: mask [count] of the chosen worlds; all if None.
 
         Raises:
-            ValueError: the World isn't `varied`; a wrong shape, a value out of its limits, or one
-                that the step is too long for. The parameters are then as they were.
+            ValueError: the World was built without `per_world_parameters`; a wrong shape, a value
+                out of range, or one for which the substep is too long. The parameters are then
+                unchanged.
         """
-        if not self.features.varied:
+        if not self.features.per_world_parameters:
             raise ValueError(
-                "set_parameters needs worlds that may differ: build the World with varied=True"
+                "set_parameters needs a World that is built with per_world_parameters=True"
             )
         mask = self._mask(worlds)
         chosen = np.flatnonzero(mask)
@@ -278,17 +285,17 @@ class World:
         new = self._simulation.parameters.pick(mask)._replace(**values)
         if not self._allow_unstable:
             self._limits.check(new, chosen)
-        self._simulation.vary_bodies(mask, new)
+        self._simulation.change_parameters(mask, new)
 
     # --- saving -------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
-        """Everything the worlds hold; `restore` continues from it to the last bit."""
-        own = self.parameters if self.features.varied else None
+        """The complete state; worlds continue bitwise identically after `restore`."""
+        own = self.parameters if self.features.per_world_parameters else None
         return Snapshot(self.scene, self.fidelity, copy_state(self._simulation.state), own)
 
     def restore(self, saved: Snapshot) -> None:
-        """Takes all worlds back to a snapshot of a world of the same scene, fidelity and count."""
+        """Returns all worlds to a snapshot of a World of the same scene, fidelity and count."""
         instance("saved", saved, Snapshot)
         count = len(saved.state.world)
         if count != self.count:
@@ -299,12 +306,12 @@ class World:
             what = f"fidelity: {', '.join(fields)}"
         elif saved.scene != self.scene:
             what = "scene"
-        elif (saved.parameters is not None) != self.features.varied:
-            what = f"varied: {saved.parameters is not None}"
+        elif (saved.parameters is not None) != self.features.per_world_parameters:
+            what = f"per_world_parameters: {saved.parameters is not None}"
         else:
             what = ""
         if what:
-            raise ValueError(f"saved must be of the same worlds; it has another {what}")
+            raise ValueError(f"saved must be a snapshot of such a World; it has another {what}")
         simulation = self._simulation
         if saved.parameters is not None:
             pairs = zip(simulation.parameters, saved.parameters, strict=True)
@@ -318,7 +325,7 @@ class World:
 
     @property
     def features(self) -> Features:
-        """What was compiled in for this scene."""
+        """What is compiled in for this scene."""
         return self._simulation.features
 
     @property
@@ -328,18 +335,20 @@ class World:
 
     @property
     def position(self) -> Array:
-        """[count, bodies, 3] m, centres of mass: a read-only view that follows the state."""
-        return read_only(self._simulation.state.mover["position"][:, : self._simulation.bodies])
+        """[count, bodies, 3] m, centres of mass: a read-only view of the state."""
+        return read_only(self._simulation.state.dynamic["position"][:, : self._simulation.bodies])
 
     @property
     def orientation(self) -> Array:
-        """[count, bodies, 4] unit quaternions x y z w: a read-only view that follows the state."""
-        return read_only(self._simulation.state.mover["orientation"][:, : self._simulation.bodies])
+        """[count, bodies, 4] unit quaternions x y z w, w >= 0: a read-only view of the state."""
+        return read_only(
+            self._simulation.state.dynamic["orientation"][:, : self._simulation.bodies]
+        )
 
     @property
     def linear_velocity(self) -> Array:
         """[count, bodies, 3] m/s, world frame."""
-        momentum = self._simulation.state.mover["momentum"][:, : self._simulation.bodies]
+        momentum = self._simulation.state.dynamic["momentum"][:, : self._simulation.bodies]
         return read_only(momentum * self._simulation.of_bodies("inverse_mass")[..., None])
 
     @property
@@ -349,24 +358,24 @@ class World:
 
     @property
     def drive_position(self) -> Array:
-        """[count, tools, 3] m: a read-only view that follows the state."""
-        return read_only(self._simulation.state.mover["position"][:, self._simulation.bodies :])
+        """[count, drives, 3] m: a read-only view of the state."""
+        return read_only(self._simulation.state.dynamic["position"][:, self._simulation.bodies :])
 
     @property
     def drive_velocity(self) -> Array:
-        """[count, tools, 3] m/s, world frame."""
+        """[count, drives, 3] m/s, world frame."""
         bodies = self._simulation.bodies
-        inverse = self._simulation.base.mover["inverse_mass"][bodies:]
-        momentum = self._simulation.state.mover["momentum"][:, bodies:]
+        inverse = self._simulation.base.dynamic["inverse_mass"][bodies:]
+        momentum = self._simulation.state.dynamic["momentum"][:, bodies:]
         return read_only(momentum * inverse[:, None])
 
     @property
     def drive_reference(self) -> Array:
-        """[count, tools, 3] m, where the servos pull to: a read-only view of the state."""
-        return read_only(self._simulation.state.mover["reference"][:, self._simulation.bodies :])
+        """[count, drives, 3] m, set points of the servos: a read-only view of the state."""
+        return read_only(self._simulation.state.dynamic["reference"][:, self._simulation.bodies :])
 
     def read(self) -> Readout:
-        """All poses and velocities as they are now, drives after the bodies: read-only."""
+        """All poses and velocities now, drives after the bodies: read-only."""
         return self._simulation.readout()
 
     def kinetic_energy(self) -> Array:
@@ -386,70 +395,84 @@ class World:
         return energies.angular_momentum(self._simulation)
 
     def penetration(self) -> Array:
-        """[count] m, deepest overlap now; 0 where nothing touches."""
-        self._settle()
+        """[count] m, deepest penetration now; 0 where nothing touches."""
+        self._refresh()
         simulation = self._simulation
         return diagnostics.penetration(simulation.model, self.features, simulation.state)
 
     def contacts(self, world: int = 0) -> Contacts:
-        """Who touches what in one world, where and how hard."""
-        self._settle()
+        """What touches what in one world, where and how hard."""
+        self._refresh()
         simulation, index = self._simulation, self._world_index(world)
-        return diagnostics.contacts(simulation.model, self.features, simulation.state, index)
+        return diagnostics.contacts(
+            simulation.model, self.features, simulation.state, index, self.scene.solid_names
+        )
 
-    def samples(self, solid: int) -> tuple[Array, float | Array]:
+    def index(self, name: str) -> int:
+        """Index of the solid with this name: bodies, then drives, then statics, in scene order.
+
+        A gripper's fingers are called "name[0]" and "name[1]". A solid without a name of its own is
+        called by its kind and index, as "body 0".
+
+        Raises:
+            TypeError, ValueError: there is no solid of this name; the message lists them.
+        """
+        return self._solids.index("name", text("name", name))
+
+    def samples(self, solid: int | str) -> tuple[Array, float | Array]:
         """Points with which a solid touches others: [n, 3] m in its frame, and their radius in m.
 
-        Of a Compound whose samples differ in it, their radii [n]. A solid that others only touch
-        with theirs, as the ground, has none.
+        For a Compound whose samples have different radii, their radii [n]. A solid without samples,
+        such as the ground, has none.
 
         Args:
-            solid: its index, as in `first_touch`.
+            solid: its index or name, see `index`.
         """
         return diagnostics.samples(self._simulation.base, self._solids.index("solid", solid))
 
-    def first_touch(self, first: int, second: int) -> Array:
+    def first_touch(self, first: int | str, second: int | str) -> Array:
         """[count] s, when two solids first touched since their state was set; NaN before.
 
         Args:
-            first: index of a solid: bodies, then tools, then statics, each in scene order.
+            first: index or name of a solid, see `index`.
             second: another.
         """
-        sides = self._solids.pair(first, second)[2]
-        self._settle()
-        return diagnostics.first_touch(self._simulation.state, sides)
+        half_pairs = self._solids.pair(first, second)[2]
+        self._refresh()
+        return diagnostics.first_touch(self._simulation.state, half_pairs)
 
-    def first_touch_position(self, first: int, second: int) -> Array:
-        """[count, 3] m, where the centre of one of two solids was at their first touch; NaN before.
+    def first_touch_position(self, first: int | str, second: int | str) -> Array:
+        """[count, 3] m, position of a solid when it first touched another; NaN before.
 
         Args:
-            first: index of the solid whose position is told, as in `first_touch`.
-            second: another, that comes after it.
+            first: index or name of the solid, see `index`.
+            second: another solid, with a larger index.
         """
-        one, other, sides = self._solids.pair(first, second)
+        one, other, half_pairs = self._solids.pair(first, second)
         if one > other:
             raise ValueError(
-                f"first must come before second, whose position isn't kept: got {one} and {other}"
+                f"first must come before second, whose position isn't stored: got {first!r} and "
+                f"{second!r}"
             )
-        self._settle()
-        return diagnostics.first_touch_position(self._simulation.state, sides)
+        self._refresh()
+        return diagnostics.first_touch_position(self._simulation.state, half_pairs)
 
-    def pressing(self, first: int, second: int) -> Array:
-        """[count] N, the sum of the normal forces between two solids, as in `first_touch`."""
-        sides = self._solids.pair(first, second)[2]
-        self._settle()
-        return diagnostics.pressing(self._simulation.state, sides)
+    def normal_force(self, first: int | str, second: int | str) -> Array:
+        """[count] N, sum of the normal forces between two solids; arguments as `first_touch`."""
+        half_pairs = self._solids.pair(first, second)[2]
+        self._refresh()
+        return diagnostics.normal_force(self._simulation.state, half_pairs)
 
     def largest_stable_step(self, world: int = 0) -> float:
-        """Largest stable step in s with the contacts that a world has now; inf without any."""
-        self._settle()
+        """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
+        self._refresh()
         simulation, index = self._simulation, self._world_index(world)
         return stability.of_contacts(simulation.model, self.features, simulation.state, index)
 
     @property
     def nbytes(self) -> int:
-        """Bytes of state a world, beyond the shared model; of varied worlds with their own."""
-        own = self._simulation.model.nbytes if self.features.varied else 0
+        """Bytes of state per world, with the model where worlds have their own parameters."""
+        own = self._simulation.model.nbytes if self.features.per_world_parameters else 0
         return (self._simulation.state.nbytes + own) // self.count
 
     def _world_index(self, world: int) -> int:

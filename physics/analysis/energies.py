@@ -9,11 +9,11 @@ Array = np.ndarray
 
 def kinetic_energy(simulation: Simulation) -> Array:
     """[count] J of the bodies, translation and rotation."""
-    momentum = simulation.state.mover["momentum"][:, : simulation.bodies]
+    momentum = simulation.state.dynamic["momentum"][:, : simulation.bodies]
     inverse = simulation.of_bodies("inverse_mass")
     axes = "wbi,wbi,b->w" if inverse.ndim == 1 else "wbi,wbi,wb->w"
     translation = np.einsum(axes, momentum, momentum, inverse)
-    angular = simulation.state.mover["angular_momentum"][:, : simulation.bodies]
+    angular = simulation.state.dynamic["angular_momentum"][:, : simulation.bodies]
     rotation = np.einsum("wbi,wbi->w", angular, simulation.angular_velocity())
     return 0.5 * (translation + rotation)
 
@@ -22,17 +22,17 @@ def potential_energy(simulation: Simulation) -> Array:
     """[count] J of the bodies in the field of gravity, zero at the origin."""
     weight = simulation.of_bodies("weight")
     axes = "wbi,bi->w" if weight.ndim == 2 else "wbi,wbi->w"
-    position = simulation.state.mover["position"][:, : simulation.bodies]
+    position = simulation.state.dynamic["position"][:, : simulation.bodies]
     return np.asarray(-np.einsum(axes, position, weight))
 
 
 def linear_momentum(simulation: Simulation) -> Array:
     """[count, 3] kg m/s of the bodies."""
-    return np.asarray(simulation.state.mover["momentum"][:, : simulation.bodies].sum(axis=1))
+    return np.asarray(simulation.state.dynamic["momentum"][:, : simulation.bodies].sum(axis=1))
 
 
 def angular_momentum(simulation: Simulation) -> Array:
     """[count, 3] kg m^2/s of the bodies about the origin."""
-    mover = simulation.state.mover[:, : simulation.bodies]
-    orbital = np.cross(mover["position"], mover["momentum"])
-    return np.asarray((orbital + mover["angular_momentum"]).sum(axis=1))
+    dynamic = simulation.state.dynamic[:, : simulation.bodies]
+    orbital = np.cross(dynamic["position"], dynamic["momentum"])
+    return np.asarray((orbital + dynamic["angular_momentum"]).sum(axis=1))

@@ -1,4 +1,4 @@
-"""Steps that a scene can't be simulated with are refused, by name, before the first of them."""
+"""Checks before the first step that the substep is short enough for the scene."""
 
 import math
 from dataclasses import replace
@@ -12,16 +12,17 @@ from physics.model.pairs import spacing
 from physics.model.tables import Model
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters, with_parameters
-from physics.scene.scene import Ground, Scene
+from physics.scene.scene import Scene
 from physics.scene.shapes import Sphere
+from physics.scene.solids import Ground
 
 
 def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
-    """Refuses a substep that is too long for what a scene names, or for the scene itself.
+    """Raises an error if the substep is too long for a scene.
 
     Raises:
-        ValueError: a Material.stiffness or Drive.frequency that makes it unstable, with what binds
-            it and the largest safe step; a body that would sink into the ground.
+        ValueError: a Material.stiffness or Drive.frequency makes it unstable (the message names the
+            solid that limits it and the largest safe step), or a body would sink into the ground.
     """
     _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
@@ -31,8 +32,8 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
 def check_range(scene: Scene, fidelity: Fidelity, low: Parameters, high: Parameters) -> None:
     """As `check_step`, for all parameters between two ends [1, bodies].
 
-    Stability is looked for at the ends: all bodies at one, and each in turn at the other. Without a
-    stiffness that materials name it follows from the masses, and only the smallest can sink.
+    Stability is checked at the ends: all bodies at one end, and each in turn at the other. Where no
+    material gives a stiffness it follows from the masses, and only the smallest body can sink.
     """
     _check_spacing(scene, fidelity, low, high, "")
     if not _given_stiffness(scene):
@@ -64,19 +65,19 @@ def _check_built(scene: Scene, fidelity: Fidelity, p: Parameters, what: str) -> 
         check_step(built, fidelity, *build(built, fidelity))
     except ValueError as error:
         values = ", ".join(
-            f"body {i}: mass {p.mass[0, i]:g} kg, size {p.size[0, i]:g}, "
+            f"{scene.solid_names[i]}: mass {p.mass[0, i]:g} kg, size {p.size[0, i]:g}, "
             f"restitution {p.restitution[0, i]:g}"
             for i in range(len(scene.bodies))
         )
-        raise ValueError(f"{what} can't be had ({values}): {error}") from None
+        raise ValueError(f"{what} can't be simulated ({values}): {error}") from None
 
 
 def _check_spacing(
     scene: Scene, fidelity: Fidelity, low: Parameters, high: Parameters, where: str
 ) -> None:
-    """Samples stay what they are in the scene: a body that shrinks could fall between them."""
-    largest = [*high.size[0], *(1.0 for _ in (*scene.tools, *scene.statics))]
-    solids = [*scene.bodies, *scene.tools, *scene.statics]
+    """Samples don't scale with other bodies: a body that shrinks could fall between them."""
+    largest = [*high.size[0], *(1.0 for _ in (*scene.driven_bodies, *scene.statics))]
+    solids = [*scene.bodies, *scene.driven_bodies, *scene.statics]
     for i, solid in enumerate(solids):
         if isinstance(solid, Ground) or isinstance(solid.shape, Sphere):
             continue  # a plane has no samples, and the one of a sphere is exact
@@ -85,47 +86,49 @@ def _check_spacing(
             width = float(low.size[0, j]) * body.shape.width
             if i != j and apart > width * (1.0 + 1e-9):
                 raise ValueError(
-                    f"size {low.size[0, j]:g} makes body {j}{where} {width:g} m wide, and the "
-                    f"samples of solid {i} can lie {apart:g} m apart: it would fall between them; "
-                    "keep sizes closer together, or choose a smaller Fidelity.spacing"
+                    f"size {low.size[0, j]:g} makes {scene.solid_names[j]}{where} {width:g} m "
+                    f"wide, and the samples of {scene.solid_names[i]} can be {apart:g} m apart: it "
+                    "would fall between them; choose sizes that differ less, or a smaller "
+                    "Fidelity.spacing"
                 )
 
 
 def _below(x: float) -> str:
-    """Three digits of a positive number, rounded down: what is told as safe must be."""
+    """Three digits of a positive number, rounded down: a step reported as safe must be safe."""
     unit = 10.0 ** (math.floor(math.log10(x)) - 2)
     return f"{math.floor(x / unit * (1.0 - 1e-12)) * unit:.3g}"
 
 
 def _check_sink(scene: Scene, fidelity: Fidelity, model: Model) -> None:
-    """A step so long that what lies on a static would sink into it is a slip of the pen."""
+    """Raises an error if a body at rest would sink into a static by half its width."""
     h, gravity, bodies = fidelity.substep, math.hypot(*scene.gravity), len(scene.bodies)
     if _given_stiffness(scene):
         return
-    for side in model.side:
-        i = int(side["owner"])
-        if i >= bodies or side["surface"] < len(model.mover):
+    for half_pair in model.half_pair:
+        i = int(half_pair["owner"])
+        if i >= bodies or half_pair["surface"] < len(model.dynamic):
             continue
         width = scene.bodies[i].shape.width
-        sink = gravity * float(side["pair_mass"] / side["stiffness"])
+        sink = gravity * float(half_pair["pair_mass"] / half_pair["stiffness"])
         if sink > 0.5 * width:
             longest = _below(h * math.sqrt(0.5 * width / sink))
             raise ValueError(
-                f"Fidelity.substep {h:g} s is too long for body {i}, which is {width:g} m wide and "
-                f"would sink by {sink:.3g} m at rest: at most {longest} s fit it; or build the "
-                "World with allow_unstable=True"
+                f"Fidelity.substep {h:g} s is too long for {scene.solid_names[i]}, which is "
+                f"{width:g} m wide and would sink by {sink:.3g} m at rest: use at most {longest} "
+                "s, or build the World with allow_unstable=True"
             )
 
 
 def _check_servos(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     h, bodies = fidelity.substep, len(scene.bodies)
-    for i, drive in enumerate(scene.tools):
-        longest = stability.of_servo(model.mover[bodies + i])
+    for i, drive in enumerate(scene.driven_bodies):
+        longest = stability.of_servo(model.dynamic[bodies + i])
         if h >= longest:
             raise ValueError(
-                f"Drive.frequency {drive.frequency:g} rad/s of tool {i} makes the substep of "
-                f"{h:g} s unstable: the largest safe step is {_below(longest)} s; lower the "
-                "frequency, shorten Fidelity.substep, or build the World with allow_unstable=True"
+                f"Drive.frequency {drive.frequency:g} rad/s of {scene.solid_names[bodies + i]} "
+                f"makes the substep of {h:g} s unstable: the largest safe step is "
+                f"{_below(longest)} s; lower the frequency, shorten Fidelity.substep, or build the "
+                "World with allow_unstable=True"
             )
 
 
@@ -134,41 +137,40 @@ def _check_stiffness(scene: Scene, fidelity: Fidelity, model: Model, features: F
     if not given:
         return
     h = fidelity.substep
-    step, mover = _safe_step(scene, fidelity, model, features)
+    step, binding = _safe_step(scene, fidelity, model, features)
     if h > step:
-        for _ in range(8):  # friction's damping depends on the step as well, a little
+        for _ in range(8):  # the damping of friction depends slightly on the step
             model, _ = build(scene, replace(fidelity, substep=step))
-            step, mover = _safe_step(scene, fidelity, model, features)
+            step, binding = _safe_step(scene, fidelity, model, features)
         raise ValueError(
-            f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: {mover} "
-            f"binds, and the largest safe step is {_below(step)} s; lower the stiffness, shorten "
-            "Fidelity.substep, or build the World with allow_unstable=True"
+            f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: "
+            f"{binding} limits it, and the largest safe step is {_below(step)} s; lower the "
+            "stiffness, shorten Fidelity.substep, or build the World with allow_unstable=True"
         )
 
 
 def cause_of_divergence(
     scene: Scene, fidelity: Fidelity, model: Model, features: Features, h: float
 ) -> str:
-    """Why worlds became non-finite at a substep of h s, as far as a scene tells."""
-    step, mover = _safe_step(scene, fidelity, model, features)
+    """The likely cause of worlds becoming non-finite at a substep of h s."""
+    step, binding = _safe_step(scene, fidelity, model, features)
     if h > step and _given_stiffness(scene):
         return (
             f"the substep of {h:g} s is longer than the largest safe one, {_below(step)} s, which "
-            f"{mover} sets"
+            f"{binding} limits"
         )
     return "a state, speed or force too large for double precision"
 
 
 def _given_stiffness(scene: Scene) -> list[float]:
-    """Stiffness in N/m of the materials that name one."""
-    solids = (*scene.bodies, *scene.statics, *scene.tools)
+    """Stiffness in N/m of the materials that give one."""
+    solids = (*scene.bodies, *scene.statics, *scene.driven_bodies)
     return [x.material.stiffness for x in solids if x.material.stiffness is not None]
 
 
 def _safe_step(
     scene: Scene, fidelity: Fidelity, model: Model, features: Features
 ) -> tuple[float, str]:
-    """A step in s that is safe in any state, and the name of the mover that binds it."""
+    """A step in s that is safe in any state, and the name of the dynamic body that limits it."""
     step, i = stability.of_scene(scene, model, features, fidelity.spacing)
-    bodies = len(scene.bodies)
-    return step, f"body {i}" if i < bodies else f"tool {i - bodies}"
+    return step, scene.solid_names[i]

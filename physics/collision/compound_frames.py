@@ -1,47 +1,51 @@
-"""Parts of compounds: frames of their own, for the geometry of their surfaces.
+"""Frames of compound parts, in which their surfaces are described.
 
-A part moves as its solid does, which alone has mass: forces and impulses act on that. Where another
-part hides a face of a box, a sample that is over it is none of that box's business, and one within
-the box doesn't leave by it, see `physics.scene.internal_faces`.
+A part moves with its solid, which alone has mass: forces and impulses act on the solid. Where
+another part hides a face of a box, the box ignores samples over that face, and a sample inside the
+box does not leave through it, see `physics.scene.internal_faces`.
 """
 
 import math
 from functools import cache
 
 from physics.jit import LANES, at, kernel, stage
-from physics.motion.vectors import turned
+from physics.motion.vectors import rotated
 
 
 @cache
-def make_parts(features):
-    """Stage that places the parts, if there are any."""
+def make_compound_frames(features):
+    """Stage that updates the frames of compound parts, if there are any."""
     compound = features.compound
 
     @stage
-    def parts(model, work):
+    def compound_frames(model, workspace):
         if compound:
-            place_parts(model, work)
+            place_compound_parts(model, workspace)
 
-    return parts
+    return compound_frames
 
 
 @stage
-def place_parts(model, work):
-    """Brings the frames of all parts up to those of their solids."""
-    first = model.mover.shape[0] + model.static.shape[0]
-    for q in range(model.part.shape[0]):
-        constants, part = model.part[q], work.solid[first + q]
-        solid, place, turn = work.solid[constants.solid], constants.position, constants.rotation
-        R, c, v, omega = solid.rotation, solid.position, solid.velocity, solid.spin
-        Q, b, u, spin = part.rotation, part.position, part.velocity, part.spin
+def place_compound_parts(model, workspace):
+    """Updates the frames of all parts from those of their solids."""
+    first = model.dynamic.shape[0] + model.static.shape[0]
+    for q in range(model.compound_part.shape[0]):
+        constants, part = model.compound_part[q], workspace.solid[first + q]
+        solid, place, turn = (
+            workspace.solid[constants.solid],
+            constants.position,
+            constants.rotation,
+        )
+        R, c, v, omega = solid.rotation, solid.position, solid.velocity, solid.angular_velocity
+        Q, b, u, spin = part.rotation, part.position, part.velocity, part.angular_velocity
         for column in range(3):
             for i in range(LANES):
-                x, y, z = turned(R, i, turn[column], turn[3 + column], turn[6 + column])
+                x, y, z = rotated(R, i, turn[column], turn[3 + column], turn[6 + column])
                 Q[column, i] = x
                 Q[3 + column, i] = y
                 Q[6 + column, i] = z
         for i in range(LANES):
-            x, y, z = turned(R, i, at(place[0], i), at(place[1], i), at(place[2], i))
+            x, y, z = rotated(R, i, at(place[0], i), at(place[1], i), at(place[2], i))
             b[0, i] = c[0, i] + x
             b[1, i] = c[1, i] + y
             b[2, i] = c[2, i] + z
@@ -54,25 +58,26 @@ def place_parts(model, work):
 
 
 @kernel
-def hide(model, k, candidate, seen):
-    """Writes how far hidden faces of a box count as farther out, for a side's candidates.
+def mark_hidden_faces(model, k, candidate, relative):
+    """Writes by how much hidden faces of a box count as farther out, for a half-pair's candidates.
 
-    By the box's least half extent for a sample within it, endlessly for one beyond the face.
+    The box's smallest half extent for a sample inside the box, infinity for one beyond the face.
     """
-    side = model.side[k]
-    q = side.frame - model.mover.shape[0] - model.static.shape[0]
-    if q < 0 or model.part[q].cover_count == 0:
+    half_pair = model.half_pair[k]
+    q = half_pair.frame - model.dynamic.shape[0] - model.static.shape[0]
+    if q < 0 or model.compound_part[q].hidden_face_count == 0:
         return
-    R, c, core, sizes = seen.rotation, seen.position, side.core, side.surface_size
-    first, count = model.part[q].first_cover, model.part[q].cover_count
+    R, c, core, sizes = relative.rotation, relative.position, half_pair.core, half_pair.surface_size
+    part = model.compound_part[q]
+    first, count = part.first_hidden_face, part.hidden_face_count
     for n in range(candidate.shape[0]):
         row = candidate[n]
         for axis in range(3):
             for i in range(LANES):
-                row.cover[axis, i] = 0.0
+                row.hidden_offset[axis, i] = 0.0
         for s in range(first, first + count):
-            cover = model.cover[s]
-            axis, sign, face = cover.axis, cover.sign, cover.face
+            hidden = model.hidden_face[s]
+            axis, sign, face = hidden.axis, hidden.sign, hidden.face
             second, third = (axis + 1) % 3, (axis + 2) % 3
             for i in range(LANES):
                 x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
@@ -83,8 +88,10 @@ def hide(model, k, candidate, seen):
                 )
                 p, u, v = sign * (p + c[axis, i]), u + c[second, i], v + c[third, i]
                 size = at(sizes, i)
-                over = (p > 0.0) & (u >= size * cover.low[0]) & (u <= size * cover.high[0])
-                over = over & (v >= size * cover.low[1]) & (v <= size * cover.high[1])
+                over = (p > 0.0) & (u >= size * hidden.low[0]) & (u <= size * hidden.high[0])
+                over = over & (v >= size * hidden.low[1]) & (v <= size * hidden.high[1])
                 least = min(at(core[0], i), min(at(core[1], i), at(core[2], i)))
                 far = math.inf if p > size * face else least
-                row.cover[axis, i] = max(row.cover[axis, i], far) if over else row.cover[axis, i]
+                row.hidden_offset[axis, i] = (
+                    max(row.hidden_offset[axis, i], far) if over else row.hidden_offset[axis, i]
+                )

@@ -1,12 +1,13 @@
 """Distance of a point from the core of a surface, and the outward normal there.
 
-Points are in the surface's own frame. Each function is free of branches that a vector lane can't
-take, and returns (distance m, normal x y z) and, for a box, the face.
+Points are in the frame of the surface. All functions are free of branches, so that LLVM can
+vectorise the loops around them, and return (distance m, normal x y z); that of a box also the face.
 """
 
 import math
 
 from physics.jit import stage
+from physics.scene.shapes import BOX, CAPSULE, PLANE
 
 
 @stage
@@ -34,21 +35,31 @@ def _pick(on_x, on_y, x, y, z):
 
 
 @stage
-def box_distance(x, y, z, a, b, c, face, radius, sharp, wx=0.0, wy=0.0, wz=0.0):
+def box_distance(x, y, z, a, b, c, face, radius, face_normals, wx=0.0, wy=0.0, wz=0.0):
     """From a box of half extents a, b, c; negative inside.
 
-    A ball rolls over the box's edges: outside, the nearest point decides (`sharp` false). The
-    corner or edge of another box is pushed out by faces alone (`sharp` true): near an edge, where
-    equal boxes have all their samples when they are stacked, a normal from the nearest point leans
-    out sideways, and would drive the stack apart. It rests on a face until it is `radius`, which is
-    all that rounds both boxes, beyond the face's border.
+    With `face_normals` false (samples of balls and capsules) the nearest point decides: a ball
+    rolls over the box's edges. With `face_normals` true (samples of another box) the normal is
+    always that of a face. Stacked boxes have all their samples near edges, where a normal from the
+    nearest point leans sideways and would drive the stack apart. Such a sample stays on a face
+    until it is `radius`, the rounding of both boxes together, beyond the face's border.
 
-    `face`, by which the point came, decides while it is in contact: +-1 for +-x, 2 for y, 3 for z.
-    Deeper than the rounding, the nearest face may be the wrong side of an edge. Without one, 0, a
-    point inside leaves by the nearest.
-
-    `wx`, `wy` and `wz` are 0, or m that the faces across that axis are taken to be farther out: of
-    a compound's parts, others hide some, see `physics.scene.internal_faces`.
+    Args:
+        x: m, of the point.
+        y: likewise.
+        z: likewise.
+        a: m, half extent.
+        b: likewise.
+        c: likewise.
+        face: through which the point came in: +-1 for +-x, +-2 for y, +-3 for z. It decides while
+            the point is in contact, because below the rounding the nearest face may be the wrong
+            one beside an edge. 0: a point inside leaves by the nearest face.
+        radius: m.
+        face_normals: see above.
+        wx: m by which the faces across x count as farther out, because another part of a compound
+            hides them, see `internal_faces`; else 0.
+        wy: likewise.
+        wz: likewise.
 
     Returns:
         distance m, normal x y z, and the face to remember.
@@ -63,28 +74,54 @@ def box_distance(x, y, z, a, b, c, face, radius, sharp, wx=0.0, wy=0.0, wz=0.0):
     out = math.sqrt(ox * ox + oy * oy + oz * oz)
     outside = max(qx, max(qy, qz)) > 0.0
 
-    # the remembered face, and how far the point is over it and beyond its border
+    # height over the remembered face, and distance beyond its border
     axis = abs(face)
     first, second = axis == 1.0, axis == 2.0
     sign = math.copysign(1.0, face)
     over = sign * _pick(first, second, x, y, z) - _pick(first, second, a, b, c)
     beside = max(qy if first else qx, qy if axis == 3.0 else qz)
-    lasting = (over < radius) & (beside < radius) if sharp else not outside
+    lasting = (over < radius) & (beside < radius) if face_normals else not outside
     known = lasting & (face != 0.0) & (_pick(first, second, wx, wy, wz) == 0.0)
 
     on_x = first if known else qx >= max(qy, qz)
     on_y = second if known else (not on_x) & (qy >= qz)
-    side = sign if known else math.copysign(1.0, _pick(on_x, on_y, x, y, z))
-    ix = side if on_x else 0.0
-    iy = side if on_y else 0.0
-    iz = 0.0 if on_x | on_y else side
+    outward = sign if known else math.copysign(1.0, _pick(on_x, on_y, x, y, z))
+    ix = outward if on_x else 0.0
+    iy = outward if on_y else 0.0
+    iz = 0.0 if on_x | on_y else outward
     height = over if known else _pick(on_x, on_y, hx, hy, hz)
     beyond = max(qy if on_x else qx, qz if on_x | on_y else qy)
 
-    round_off = outside & (not sharp)
+    round_off = outside & (not face_normals)
     inverse = 1.0 / max(out, 1e-150)
     nx = math.copysign(ox * inverse, x) if round_off else ix
     ny = math.copysign(oy * inverse, y) if round_off else iy
     nz = math.copysign(oz * inverse, z) if round_off else iz
     flat = height if beyond < radius else max(height, beyond)
     return out if round_off else flat, nx, ny, nz, ix + 2.0 * iy + 3.0 * iz
+
+
+@stage
+def _plane(x, y, z, a, b, c, radius, face_normals):
+    return z - a, 0.0, 0.0, 1.0
+
+
+@stage
+def _box(x, y, z, a, b, c, radius, face_normals):
+    d, nx, ny, nz, _ = box_distance(x, y, z, a, b, c, 0.0, radius, face_normals)
+    return d, nx, ny, nz
+
+
+@stage
+def _sphere(x, y, z, a, b, c, radius, face_normals):
+    return sphere_distance(x, y, z, a, b, c)
+
+
+@stage
+def _capsule(x, y, z, a, b, c, radius, face_normals):
+    return capsule_distance(x, y, z, a, b, c)
+
+
+def core_distance(kind):
+    """Distance from the core of one kind of surface, without memory of a face."""
+    return {PLANE: _plane, BOX: _box, CAPSULE: _capsule}.get(kind, _sphere)

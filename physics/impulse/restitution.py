@@ -1,17 +1,18 @@
-"""Instantaneous collisions with restitution, of any number of contacts at once.
+"""Instantaneous collisions with restitution, for any number of contacts at once.
 
-Bodies collide with the speeds of now, without what the last step gave only to push overlaps apart.
-A contact collides if it closes faster than the floor, (v_a - v_b) n < -v_0, and will have touched
-by the middle of the coming drift. All that touches takes part: a blow on a stack is felt below it.
-Poisson's hypothesis, which unlike Newton's needs no more care for several contacts than for one:
+Bodies collide with their present velocities, without what the last step gave only to push
+overlapping bodies apart. A contact collides if it approaches faster than a floor,
+(v_a - v_b) n < -v_0, and will touch by the middle of the coming drift. All contacts that touch take
+part, so an impact on a stack is felt below it. Poisson's hypothesis, which unlike Newton's stays
+consistent with several contacts:
 
-1. compression: impulses p >= 0 that stop all approach, with Coulomb friction, found by rounds of
-   Gauss-Seidel; each correction takes energy or leaves it;
-2. restitution: every colliding contact gives e p again, all at once. Without friction the speeds
-   become -e times what they were. The energy that this returns is e^2 of what compression took;
-   if, by friction's doing, it would be more, it is scaled down to that, with the largest e of what
-   collides in the world at that moment: no collision gains energy;
-3. friction anew, with what now presses, and no approach at contacts that only took part.
+1. compression: impulses p >= 0 that stop all approach, with Coulomb friction, by sweeps of
+   projected Gauss-Seidel. A correction never adds energy;
+2. restitution: every colliding contact applies e p again, all at once. Without friction the speeds
+   become -e times what they were, and the energy returned is e^2 of what compression removed. If
+   friction makes it more, restitution is scaled down to that, with the largest e among the world's
+   colliding contacts: no collision gains energy;
+3. friction again with the new normal impulses, and no approach at contacts that only took part.
 
 The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the factor is the impulse.
 """
@@ -19,152 +20,157 @@ The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the fac
 import math
 from functools import cache
 
-from physics.collision.contact_point import ALMOST
-from physics.impulse.contact_rows import ends, give, slip
+from physics.collision.contact_point import TOUCH_TOLERANCE
+from physics.impulse.point_impulses import apply_impulse, operands_of, relative_velocity
 from physics.jit import LANES, at, kernel, stage
-from physics.motion.drives import make_join_speeds
+from physics.motion.drives import make_finger_velocity_coupling
 from physics.motion.vectors import cross
 
-# Rounds end when none has changed a speed by more than this share of the fastest approach, or after
-# so many
-SMALL, ROUNDS = 1e-6, 64
+# Sweeps end when none has changed a velocity by more than this fraction of the fastest approach, or
+# after so many
+TOLERANCE, MAX_SWEEPS = 1e-6, 64
 
 
 @kernel
-def find(points, owner, surface, constants, h, lane):
-    """Notes the restitution of each point that collides, -1 of others, and which lanes have one."""
+def find_impacts(pair, constants, h, lane):
+    """Notes the restitution of each colliding point, -1 of others, and which lanes have any."""
+    points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
     restitution, floors = constants.restitution, constants.rest_speed
+    fastest, largest = lane.fastest_approach, lane.impact_restitution
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
             e, floor = at(restitution, i), at(floors, i)
-            ux, uy, uz = slip(owner, surface, point, i)
+            ux, uy, uz = relative_velocity(owner, surface, point, i)
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
             un = ux * nx + uy * ny + uz * nz
-            collides = (un < -floor) & (point.gap[i] + 0.5 * h * un <= ALMOST)
+            collides = (un < -floor) & (point.separation[i] + 0.5 * h * un <= TOUCH_TOLERANCE)
             collides = collides & (point.weight[i] > 0.0)
-            point.bounce[i] = e if collides else -1.0
-            point.hit[i] = 0.0
+            point.impact_restitution[i] = e if collides else -1.0
+            point.normal_impact[i] = 0.0
             for axis in range(3):
-                point.skid[axis, i] = 0.0
-            lane.struck[i] = 1 if collides else lane.struck[i]
-            lane.speed[i] = max(lane.speed[i], -un) if collides else lane.speed[i]
-            lane.bounce[i] = max(lane.bounce[i], e) if collides else lane.bounce[i]
+                point.tangential_impact[axis, i] = 0.0
+            lane.colliding[i] = 1 if collides else lane.colliding[i]
+            fastest[i] = max(fastest[i], -un) if collides else fastest[i]
+            largest[i] = max(largest[i], e) if collides else largest[i]
 
 
 @kernel
-def retract(points, owner, surface, A, B, ma, mb, struck):
-    """Takes back what pushed overlaps apart in the last step: that speed is none of the bodies'."""
+def remove_push_out(pair, colliding):
+    """Removes, in lanes with a collision, the velocity that pushed overlapping bodies apart."""
+    points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-            ux, uy, uz = slip(owner, surface, point, i)
+            ux, uy, uz = relative_velocity(owner, surface, point, i)
             un = ux * nx + uy * ny + uz * nz
-            push = point.push[i]
-            new = min(max(push - point.mass[i] * un, 0.0), push)
-            new = new if (struck[i] != 0) & (point.weight[i] > 0.0) else push
-            step = new - push
-            point.push[i] = new
-            give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+            before = point.normal_impulse[i]
+            new = min(max(before - point.mass[i] * un, 0.0), before)
+            new = new if (colliding[i] != 0) & (point.weight[i] > 0.0) else before
+            step = new - before
+            point.normal_impulse[i] = new
+            apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
 
 
 @cache
-def make_press(features):
-    """Kernel of one round over one side's points."""
+def make_impact_sweep(features):
+    """Kernel of one sweep over the points of a half-pair."""
     friction = features.friction
 
     @kernel
-    def press(points, owner, surface, A, B, ma, mb, mu, lane, after):
-        """`after` restitution, contacts that bounce keep what they gave along the normal.
+    def impact_sweep(pair, mu, lane, after):
+        """Adds the work of all impulses to `lane.impact_work`.
 
-        Adds the work of all impulses to `lane.work`.
+        `after` restitution, colliding contacts keep their normal impulse.
         """
-        going, change, work = lane.going, lane.change, lane.work
+        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+        unconverged, change, work = lane.unconverged, lane.largest_change, lane.impact_work
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
-                part = (point.gap[i] <= 0.0) | (point.bounce[i] >= 0.0)
-                part = part & (point.weight[i] > 0.0) & (going[i] != 0)
+                involved = (point.separation[i] <= 0.0) | (point.impact_restitution[i] >= 0.0)
+                involved = involved & (point.weight[i] > 0.0) & (unconverged[i] != 0)
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-                ux, uy, uz = slip(owner, surface, point, i)
+                ux, uy, uz = relative_velocity(owner, surface, point, i)
                 un = ux * nx + uy * ny + uz * nz
-                hit = point.hit[i]
-                new = max(hit - point.mass[i] * un, 0.0)
-                kept = (not part) | (after & (point.bounce[i] > 0.0))
-                new = hit if kept else new
-                step = new - hit
-                point.hit[i] = new
+                before = point.normal_impact[i]
+                new = max(before - point.mass[i] * un, 0.0)
+                kept = (not involved) | (after & (point.impact_restitution[i] > 0.0))
+                new = before if kept else new
+                step = new - before
+                point.normal_impact[i] = new
                 change[i] = max(change[i], abs(step) / point.mass[i])
                 work[i] += step * (un + 0.5 * step / point.mass[i])
-                give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+                apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
                 if friction:
-                    ux, uy, uz = slip(owner, surface, point, i)
+                    tangential = point.tangential_impact
+                    ux, uy, uz = relative_velocity(owner, surface, point, i)
                     un = ux * nx + uy * ny + uz * nz
                     m = point.shear_mass[i]
-                    px, py, pz = point.skid[0, i], point.skid[1, i], point.skid[2, i]
+                    px, py, pz = tangential[0, i], tangential[1, i], tangential[2, i]
                     qx = px - m * (ux - un * nx)
                     qy = py - m * (uy - un * ny)
                     qz = pz - m * (uz - un * nz)
                     limit = at(mu, i) * new
                     size = math.sqrt(qx * qx + qy * qy + qz * qz)
                     cut = limit / size if size > limit else 1.0
-                    qx = cut * qx if part else px
-                    qy = cut * qy if part else py
-                    qz = cut * qz if part else pz
-                    point.skid[0, i] = qx
-                    point.skid[1, i] = qy
-                    point.skid[2, i] = qz
+                    qx = cut * qx if involved else px
+                    qy = cut * qy if involved else py
+                    qz = cut * qz if involved else pz
+                    tangential[0, i] = qx
+                    tangential[1, i] = qy
+                    tangential[2, i] = qz
                     px, py, pz = qx - px, qy - py, qz - pz
                     size = max(abs(px), max(abs(py), abs(pz)))
                     change[i] = max(change[i], size / m)
-                    give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
-                    vx, vy, vz = slip(owner, surface, point, i)
+                    apply_impulse(pair, point, i, px, py, pz)
+                    vx, vy, vz = relative_velocity(owner, surface, point, i)
                     work[i] += 0.5 * (px * (ux + vx) + py * (uy + vy) + pz * (uz + vz))
 
-    return press
+    return impact_sweep
 
 
 @kernel
-def rebound(points, owner, surface, A, B, ma, mb, lane, again):
-    """Restitution: e of what compression gave; `again`, all but a share of it is taken back."""
+def apply_restitution(pair, lane, rescale):
+    """Applies e times what compression gave; `rescale`: removes all but a fraction of it again."""
+    points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
-            e = max(point.bounce[i], 0.0)
-            compression = point.hit[i] / (1.0 + e) if again else point.hit[i]
-            step = (lane.share[i] - 1.0) * e * compression if again else e * compression
-            point.hit[i] += step
+            e, given = max(point.impact_restitution[i], 0.0), point.normal_impact[i]
+            compression = given / (1.0 + e) if rescale else given
+            scale = lane.restitution_scale[i]
+            step = (scale - 1.0) * e * compression if rescale else e * compression
+            point.normal_impact[i] += step
             nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-            ux, uy, uz = slip(owner, surface, point, i)
+            ux, uy, uz = relative_velocity(owner, surface, point, i)
             un = ux * nx + uy * ny + uz * nz
-            lane.work[i] += step * (un + 0.5 * step / point.mass[i])
-            give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
+            lane.impact_work[i] += step * (un + 0.5 * step / point.mass[i])
+            apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
 
 
 @stage
-def book_hits(model, work, look):
-    """Changes momenta by the collision's impulses; at a look, counts them among the forces."""
-    for k in range(model.side.shape[0]):
-        side = model.side[k]
-        owner, surface = work.solid[side.owner], work.solid[side.surface]
-        P, L, Q, M = (
-            owner.momentum,
-            owner.angular_momentum,
-            surface.momentum,
-            surface.angular_momentum,
-        )
-        for n in range(side.first_slot, side.first_slot + work.side[k].slots):
-            point = work.point[n]
+def apply_impacts(model, workspace, refresh):
+    """Changes momenta by the impact impulses; a refresh only counts them among the forces."""
+    for k in range(model.half_pair.shape[0]):
+        pair = operands_of(model, workspace, k)
+        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+        P, L = owner.momentum, owner.angular_momentum
+        Q, M = surface.momentum, surface.angular_momentum
+        for n in range(points.shape[0]):
+            point = points[n]
+            normal, tangential = point.normal, point.tangential_impact
+            arm, surface_arm, extra = point.arm, point.surface_arm, point.extra_impulse
             for i in range(LANES):
-                hit = point.hit[i]
-                px = hit * point.normal[0, i] + point.skid[0, i]
-                py = hit * point.normal[1, i] + point.skid[1, i]
-                pz = hit * point.normal[2, i] + point.skid[2, i]
-                if look:
-                    point.spent[0, i] += px
-                    point.spent[1, i] += py
-                    point.spent[2, i] += pz
+                size = point.normal_impact[i]
+                px = size * normal[0, i] + tangential[0, i]
+                py = size * normal[1, i] + tangential[1, i]
+                pz = size * normal[2, i] + tangential[2, i]
+                if refresh:
+                    extra[0, i] += px
+                    extra[1, i] += py
+                    extra[2, i] += pz
                     continue
                 P[0, i] += px
                 P[1, i] += py
@@ -172,15 +178,11 @@ def book_hits(model, work, look):
                 Q[0, i] -= px
                 Q[1, i] -= py
                 Q[2, i] -= pz
-                tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], px, py, pz)
+                tx, ty, tz = cross(arm[0, i], arm[1, i], arm[2, i], px, py, pz)
                 L[0, i] += tx
                 L[1, i] += ty
                 L[2, i] += tz
-                bx, by, bz = (
-                    point.surface_arm[0, i],
-                    point.surface_arm[1, i],
-                    point.surface_arm[2, i],
-                )
+                bx, by, bz = surface_arm[0, i], surface_arm[1, i], surface_arm[2, i]
                 tx, ty, tz = cross(bx, by, bz, px, py, pz)
                 M[0, i] -= tx
                 M[1, i] -= ty
@@ -189,87 +191,83 @@ def book_hits(model, work, look):
 
 @cache
 def make_impacts(features):
-    """Kernel that lets contacts collide where they do."""
-    press, join_speeds = make_press(features), make_join_speeds(features)
+    """Stage that lets contacts collide, in the worlds in which any do."""
+    impact_sweep = make_impact_sweep(features)
+    couple_finger_velocities = make_finger_velocity_coupling(features)
 
     @kernel
-    def press_all(model, work, after):
-        """Rounds over all contacts until nothing moves; lanes that have settled are left alone."""
-        lane = work.lane[0]
+    def solve_impacts(model, workspace, after):
+        """Sweeps over all contacts until they converge; converged lanes don't change any more."""
+        lane = workspace.lane[0]
+        unconverged, change = lane.unconverged, lane.largest_change
         for i in range(LANES):
-            lane.going[i] = lane.struck[i]
-        for _ in range(ROUNDS):
+            unconverged[i] = lane.colliding[i]
+        for _ in range(MAX_SWEEPS):
             for i in range(LANES):
-                lane.change[i] = 0.0
-            for k in range(model.side.shape[0]):
-                if work.side[k].slots > 0:
-                    points, A, B, ma, mb = ends(model, work, k)
-                    a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                    mu = model.side[k].friction
-                    press(points, a, b, A, B, ma, mb, mu, lane, after)
-                    join_speeds(model, work)
-            going = 0
+                change[i] = 0.0
+            for k in range(model.half_pair.shape[0]):
+                if workspace.half_pair[k].slots > 0:
+                    pair, mu = operands_of(model, workspace, k), model.half_pair[k].friction
+                    impact_sweep(pair, mu, lane, after)
+                    couple_finger_velocities(model, workspace)
+            left = 0
             for i in range(LANES):
-                lane.going[i] = lane.going[i] if lane.change[i] > SMALL * lane.speed[i] else 0
-                going += lane.going[i]
-            if going == 0:
+                moves = change[i] > TOLERANCE * lane.fastest_approach[i]
+                unconverged[i] = unconverged[i] if moves else 0
+                left += unconverged[i]
+            if left == 0:
                 break
 
     @kernel
-    def restitute(model, work, again):
-        for k in range(model.side.shape[0]):
-            if work.side[k].slots > 0:
-                points, A, B, ma, mb = ends(model, work, k)
-                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                rebound(points, a, b, A, B, ma, mb, work.lane[0], again)
-        join_speeds(model, work)
+    def restitute(model, workspace, rescale):
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                apply_restitution(operands_of(model, workspace, k), workspace.lane[0], rescale)
+        couple_finger_velocities(model, workspace)
 
     @kernel
-    def collide(model, work, look):
-        lane = work.lane[0]
+    def collide(model, workspace, refresh):
+        lane = workspace.lane[0]
+        work, allowed_work, scale = lane.impact_work, lane.allowed_work, lane.restitution_scale
         for i in range(LANES):
-            lane.work[i] = 0.0
-        press_all(model, work, False)
+            work[i] = 0.0
+        solve_impacts(model, workspace, False)
         for i in range(LANES):
-            e = lane.bounce[i]
-            lane.allowed[i] = e * e * max(-lane.work[i], 0.0)
-            lane.work[i] = 0.0
-        restitute(model, work, False)
+            e = lane.impact_restitution[i]
+            allowed_work[i] = e * e * max(-work[i], 0.0)
+            work[i] = 0.0
+        restitute(model, workspace, False)
         for i in range(LANES):
-            allowed, won = lane.allowed[i], lane.work[i]
-            lane.share[i] = math.sqrt(allowed / won) if won > allowed else 1.0
-        restitute(model, work, True)
-        press_all(model, work, True)
-        book_hits(model, work, look)
+            allowed, gained = allowed_work[i], work[i]
+            scale[i] = math.sqrt(allowed / gained) if gained > allowed else 1.0
+        restitute(model, workspace, True)
+        solve_impacts(model, workspace, True)
+        apply_impacts(model, workspace, refresh)
 
     @kernel
-    def find_all(model, work, h):
+    def find_all_impacts(model, workspace, h):
         """Number of lanes with a collision."""
-        lane, lanes = work.lane[0], 0
+        lane, lanes = workspace.lane[0], 0
         for i in range(LANES):
-            lane.struck[i] = 0
-            lane.speed[i] = 0.0
-            lane.bounce[i] = 0.0
-        for k in range(model.side.shape[0]):
-            if work.side[k].slots > 0:
-                points = ends(model, work, k)[0]
-                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                find(points, a, b, model.side[k], h, lane)
+            lane.colliding[i] = 0
+            lane.fastest_approach[i] = 0.0
+            lane.impact_restitution[i] = 0.0
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                find_impacts(operands_of(model, workspace, k), model.half_pair[k], h, lane)
         for i in range(LANES):
-            lanes += lane.struck[i]
+            lanes += lane.colliding[i]
         return lanes
 
     @stage
-    def impacts(model, work, h, look):
-        if find_all(model, work, h) == 0:
+    def impacts(model, workspace, h, refresh):
+        if find_all_impacts(model, workspace, h) == 0:
             return
-        for k in range(model.side.shape[0]):
-            if work.side[k].slots > 0:
-                points, A, B, ma, mb = ends(model, work, k)
-                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                retract(points, a, b, A, B, ma, mb, work.lane[0].struck)
-        join_speeds(model, work)
-        if find_all(model, work, h) > 0:
-            collide(model, work, look)
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                remove_push_out(operands_of(model, workspace, k), workspace.lane[0].colliding)
+        couple_finger_velocities(model, workspace)
+        if find_all_impacts(model, workspace, h) > 0:
+            collide(model, workspace, refresh)
 
     return impacts

@@ -1,228 +1,129 @@
-"""The impulse law: contacts that push as hard as it takes for solids not to approach.
+"""The impulse law: contact impulses that keep solids from approaching.
 
-The force of a step is an impulse over its time, found by going round the contacts and correcting
-one after another (Gauss-Seidel), once a substep: many short substeps converge faster than many
-rounds of a long one. Impulses of the last substep are the first guess. With u = (v_a - v_b) at the
-point, half a step old, and n out of the surface, a substep does
+The force of a step is an impulse over its duration, found by sequential impulses (projected
+Gauss-Seidel): every contact is corrected in turn, once per substep and phase. Many short substeps
+converge faster than many sweeps of a long one. The impulses of the last substep are the first
+guess. With the relative velocity u at a point, half a step old, and the normal n out of the
+surface, a substep
 
-1. collides: instantaneous collisions with restitution, see `stages/impacts.py`;
-2. relaxes: with the impulses of the last substep to start from, u n >= 0. That takes away what
-   pushed overlaps apart, which so moves bodies but gives them no energy;
-3. gives outside forces and the guess, then solves u n >= -gap/h ahead of the contact and, where
-   solids overlap, the soft contact below.
-
-A soft contact is a spring k and damper c whose force is that at the end of the step. With
-a = h (c + h k) and the impulse p so far, p changes by -(u n + k h/a gap + p/a) m a/(m + a), for a
-point that feels the mass m: stable at any step, for any k. At rest it sinks as the spring of that
-stiffness would, load / k. The speed at which overlap is pushed apart is limited.
-
-Friction is rigid: it takes what speed across the contact remains, up to mu times the impulse along
-it. An anchor remembers how far the point has crept since it came to stick, and pulls it back. The
-mass across is the least in any direction, so that the step stays a descent of the energy that the
-cone can't turn into an ascent. Resistance against rolling and spinning is the same for the spin.
+1. collides: instantaneous collisions with restitution, see `restitution.py`;
+2. relaxes: starting from the impulses of the last substep, it solves u n >= 0. This removes the
+   velocity that pushing overlapping bodies apart has given them;
+3. applies the other forces and the first guess, then solves u n >= -separation/h for bodies that
+   are apart and the soft contact of `sweep.py` for those that overlap.
 """
 
-import math
 from functools import cache
 
-from physics.impulse.contact_rows import ends, give, make_points, place_tensors, slip, turn
+from physics.impulse.contact_rows import make_contact_rows
+from physics.impulse.point_impulses import (
+    apply_angular_impulse,
+    apply_impulse,
+    operands_of,
+    rotate_inertia,
+)
 from physics.impulse.restitution import make_impacts
+from physics.impulse.sweep import make_sweep
 from physics.jit import LANES, at, kernel, stage
-from physics.model.lanes import note_touch
-from physics.motion.drives import make_join_speeds
-from physics.motion.vectors import cross, times, turned_back
+from physics.model.contact_memory import contact_memory
+from physics.model.lanes import record_contacts
+from physics.motion.drives import make_finger_velocity_coupling
+from physics.motion.vectors import cross, rotated_back, tensor_times
 
-# m/s at which overlaps are pushed apart at most
-PUSH_SPEED = 1.0
-# 1/s at which an anchor takes its stretch back
-ANCHOR = 5.0
-# 1/s at which an anchor forgets: where two sides meet in the same place but stuck apart, one can
-# only be at rest by pulling against the other, ever harder
-FORGET = 0.1
+
+@cache
+def make_warm_start(features):
+    """Kernel that applies the impulses of the last substep again, and notes what relaxing gave."""
+    friction, resistance = features.friction, features.resistance
+
+    @kernel
+    def warm_start(pair):
+        points = pair.points
+        for n in range(points.shape[0]):
+            point = points[n]
+            normal, tangential, twist = point.normal, point.tangential_impulse, point.twist
+            extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
+            for i in range(LANES):
+                size = point.normal_impulse[i]
+                px, py, pz = size * normal[0, i], size * normal[1, i], size * normal[2, i]
+                if friction:
+                    px += tangential[0, i]
+                    py += tangential[1, i]
+                    pz += tangential[2, i]
+                extra[0, i] += px
+                extra[1, i] += py
+                extra[2, i] += pz
+                apply_impulse(pair, point, i, px, py, pz)
+                if resistance:
+                    tx, ty, tz = twist[0, i], twist[1, i], twist[2, i]
+                    extra_angular[0, i] += tx
+                    extra_angular[1, i] += ty
+                    extra_angular[2, i] += tz
+                    apply_angular_impulse(pair, i, tx, ty, tz)
+
+    return warm_start
 
 
 @stage
-def resist(owner, surface, A, B, point, i, push, rolling, spinning):
-    """Corrects the angular impulse of a point against relative spin."""
-    nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-    # the least moment of inertia, by the largest row sum of its inverse
-    xx, yy, zz = A[0, i] + B[0, i], A[1, i] + B[1, i], A[2, i] + B[2, i]
-    xy, xz, yz = abs(A[3, i] + B[3, i]), abs(A[4, i] + B[4, i]), abs(A[5, i] + B[5, i])
-    inertia = 1.0 / max(max(xx + xy + xz, xy + yy + yz), max(xz + yz + zz, 1e-300))
-    wx = owner.spin[0, i] - surface.spin[0, i]
-    wy = owner.spin[1, i] - surface.spin[1, i]
-    wz = owner.spin[2, i] - surface.spin[2, i]
-    px, py, pz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
-    qx, qy, qz = px - inertia * wx, py - inertia * wy, pz - inertia * wz
-    along = qx * nx + qy * ny + qz * nz
-    qx, qy, qz = qx - along * nx, qy - along * ny, qz - along * nz
-    along = min(max(along, -spinning * push), spinning * push)
-    size = math.sqrt(qx * qx + qy * qy + qz * qz)
-    cut = rolling * push / size if size > rolling * push else 1.0
-    qx, qy, qz = cut * qx + along * nx, cut * qy + along * ny, cut * qz + along * nz
-    point.twist[0, i] = qx
-    point.twist[1, i] = qy
-    point.twist[2, i] = qz
-    turn(owner, surface, A, B, i, qx - px, qy - py, qz - pz)
+def remember(memory, first, i, updates, x, y, z):
+    """Stores a vector in three rows of a contact's memory, in a lane that updates its memory."""
+    memory[first, i] = x if updates else memory[first, i]
+    memory[first + 1, i] = y if updates else memory[first + 1, i]
+    memory[first + 2, i] = z if updates else memory[first + 2, i]
 
 
 @cache
-def make_sweep(features):
-    """Kernel that corrects the impulses of one side's points, one after another."""
+def make_store_forces(features):
+    """Kernel that adds the forces of a half-pair's points, and stores what contacts remember."""
     friction, resistance = features.friction, features.resistance
+    memory_rows = contact_memory(features)
+    NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
+    SHEAR, TWIST = memory_rows.shear, memory_rows.twist
 
     @kernel
-    def sweep(points, owner, surface, A, B, ma, mb, constants, h, soft):
-        """`soft`: with the bias that pushes overlaps apart, and the softness that goes with it."""
-        frictions, floors = constants.friction, constants.rest_speed
-        stiffness, damping = constants.stiffness, constants.damping
-        rolling, spinning = constants.rolling, constants.spinning
-        per_h = 1.0 / h
-        for n in range(points.shape[0]):
-            point = points[n]
-            for i in range(LANES):
-                mu, floor = at(frictions, i), at(floors, i)
-                K, C = at(stiffness, i), at(damping, i)
-                rate = K / (C + h * K)
-                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-                gap, weight, m, push = point.gap[i], point.weight[i], point.mass[i], point.push[i]
-                ux, uy, uz = slip(owner, surface, point, i)
-                un = ux * nx + uy * ny + uz * nz
-                ahead = gap > 0.0
-                bias = gap * per_h if ahead else 0.0
-                mass, leak = m, 0.0
-                if soft:
-                    a = h * weight * (C + h * K)
-                    yielding = not ahead
-                    leak = m / (m + a) if yielding else 0.0
-                    mass = a * leak if yielding else m
-                    bias = max(rate * gap, -PUSH_SPEED) if yielding else bias
-                # what will collide must arrive at its full speed
-                bias = -un if ahead & (un < -floor) else bias
-                new = max(push - mass * (un + bias) - leak * push, 0.0)
-                new = new if weight > 0.0 else 0.0
-                step = new - push
-                point.push[i] = new
-                give(owner, surface, A, B, ma, mb, point, i, step * nx, step * ny, step * nz)
-                if friction:
-                    ux, uy, uz = slip(owner, surface, point, i)
-                    un = ux * nx + uy * ny + uz * nz
-                    sx, sy, sz = ux - un * nx, uy - un * ny, uz - un * nz
-                    if soft:
-                        sx += ANCHOR * point.anchor[0, i]
-                        sy += ANCHOR * point.anchor[1, i]
-                        sz += ANCHOR * point.anchor[2, i]
-                    mt = point.shear_mass[i]
-                    px, py, pz = point.pull[0, i], point.pull[1, i], point.pull[2, i]
-                    qx, qy, qz = px - mt * sx, py - mt * sy, pz - mt * sz
-                    limit = mu * new
-                    size = math.sqrt(qx * qx + qy * qy + qz * qz)
-                    cut = limit / size if size > limit else 1.0
-                    qx *= cut
-                    qy *= cut
-                    qz *= cut
-                    point.pull[0, i] = qx
-                    point.pull[1, i] = qy
-                    point.pull[2, i] = qz
-                    if soft:
-                        held = 1.0 - h * FORGET if size <= limit else 0.0
-                        point.anchor[0, i] *= held
-                        point.anchor[1, i] *= held
-                        point.anchor[2, i] *= held
-                    give(owner, surface, A, B, ma, mb, point, i, qx - px, qy - py, qz - pz)
-                if resistance:
-                    resist(owner, surface, A, B, point, i, new, rolling, spinning)
-
-    return sweep
-
-
-@cache
-def make_warm(features):
-    """Kernel that gives the impulses of the last substep anew, and books what relaxing gave."""
-    friction, resistance = features.friction, features.resistance
-
-    @kernel
-    def warm(points, owner, surface, A, B, ma, mb):
-        for n in range(points.shape[0]):
-            point = points[n]
-            for i in range(LANES):
-                push = point.push[i]
-                px, py, pz = (
-                    push * point.normal[0, i],
-                    push * point.normal[1, i],
-                    push * point.normal[2, i],
-                )
-                if friction:
-                    px += point.pull[0, i]
-                    py += point.pull[1, i]
-                    pz += point.pull[2, i]
-                point.spent[0, i] += px
-                point.spent[1, i] += py
-                point.spent[2, i] += pz
-                give(owner, surface, A, B, ma, mb, point, i, px, py, pz)
-                if resistance:
-                    tx, ty, tz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
-                    point.turned[0, i] += tx
-                    point.turned[1, i] += ty
-                    point.turned[2, i] += tz
-                    turn(owner, surface, A, B, i, tx, ty, tz)
-
-    return warm
-
-
-@cache
-def make_book(features):
-    """Kernel that adds the forces of one side's points, and keeps what they remember."""
-    friction, resistance = features.friction, features.resistance
-
-    @kernel
-    def book(points, candidate, owner, surface, keeps, h, pressed):
+    def store_forces(pair, candidate, updates_memory, h, normal_force_sum):
+        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
         Q, per_h = surface.rotation, 1.0 / h
         F, T, G, U = owner.force, owner.torque, surface.force, surface.torque
         for n in range(points.shape[0]):
             point, row = points[n], candidate[n]
+            memory, impact_force = row.memory, row.impact_force
+            normal, arm, surface_arm = point.normal, point.arm, point.surface_arm
+            tangential, tangential_impact = point.tangential_impulse, point.tangential_impact
+            extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
             for i in range(LANES):
-                push = point.push[i]
-                fx = point.spent[0, i] + push * point.normal[0, i]
-                fy = point.spent[1, i] + push * point.normal[1, i]
-                fz = point.spent[2, i] + push * point.normal[2, i]
-                pressed[i] += per_h * (push + point.hit[i])
-                row.load[i] = per_h * push if keeps[i] != 0 else row.load[i]
-                hit = per_h * point.hit[i]
-                bx, by, bz = turned_back(
+                updates, size = updates_memory[i] != 0, point.normal_impulse[i]
+                fx = extra[0, i] + size * normal[0, i]
+                fy = extra[1, i] + size * normal[1, i]
+                fz = extra[2, i] + size * normal[2, i]
+                normal_force_sum[i] += per_h * (size + point.normal_impact[i])
+                memory[NORMAL, i] = per_h * size if updates else memory[NORMAL, i]
+                impact = per_h * point.normal_impact[i]
+                bx, by, bz = rotated_back(
                     Q,
                     i,
-                    hit * point.normal[0, i] + per_h * point.skid[0, i],
-                    hit * point.normal[1, i] + per_h * point.skid[1, i],
-                    hit * point.normal[2, i] + per_h * point.skid[2, i],
+                    impact * normal[0, i] + per_h * tangential_impact[0, i],
+                    impact * normal[1, i] + per_h * tangential_impact[1, i],
+                    impact * normal[2, i] + per_h * tangential_impact[2, i],
                 )
-                row.blow[0, i] = bx if keeps[i] != 0 else row.blow[0, i]
-                row.blow[1, i] = by if keeps[i] != 0 else row.blow[1, i]
-                row.blow[2, i] = bz if keeps[i] != 0 else row.blow[2, i]
+                remember(impact_force, 0, i, updates, bx, by, bz)
                 if friction:
-                    px, py, pz = point.pull[0, i], point.pull[1, i], point.pull[2, i]
+                    px, py, pz = tangential[0, i], tangential[1, i], tangential[2, i]
                     fx += px
                     fy += py
                     fz += pz
-                    px, py, pz = turned_back(Q, i, per_h * px, per_h * py, per_h * pz)
-                    row.pull[0, i] = px if keeps[i] != 0 else row.pull[0, i]
-                    row.pull[1, i] = py if keeps[i] != 0 else row.pull[1, i]
-                    row.pull[2, i] = pz if keeps[i] != 0 else row.pull[2, i]
-                    sx, sy, sz = turned_back(
-                        Q, i, point.anchor[0, i], point.anchor[1, i], point.anchor[2, i]
-                    )
-                    row.shear[0, i] = sx if keeps[i] != 0 else row.shear[0, i]
-                    row.shear[1, i] = sy if keeps[i] != 0 else row.shear[1, i]
-                    row.shear[2, i] = sz if keeps[i] != 0 else row.shear[2, i]
+                    px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
+                    remember(memory, TANGENT, i, updates, px, py, pz)
+                    anchor = point.anchor
+                    sx, sy, sz = rotated_back(Q, i, anchor[0, i], anchor[1, i], anchor[2, i])
+                    remember(memory, SHEAR, i, updates, sx, sy, sz)
                 if resistance:
                     tx, ty, tz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
-                    px, py, pz = turned_back(Q, i, per_h * tx, per_h * ty, per_h * tz)
-                    row.twist[0, i] = px if keeps[i] != 0 else row.twist[0, i]
-                    row.twist[1, i] = py if keeps[i] != 0 else row.twist[1, i]
-                    row.twist[2, i] = pz if keeps[i] != 0 else row.twist[2, i]
-                    tx = per_h * (tx + point.turned[0, i])
-                    ty = per_h * (ty + point.turned[1, i])
-                    tz = per_h * (tz + point.turned[2, i])
+                    px, py, pz = rotated_back(Q, i, per_h * tx, per_h * ty, per_h * tz)
+                    remember(memory, TWIST, i, updates, px, py, pz)
+                    tx = per_h * (tx + extra_angular[0, i])
+                    ty = per_h * (ty + extra_angular[1, i])
+                    tz = per_h * (tz + extra_angular[2, i])
                     T[0, i] += tx
                     T[1, i] += ty
                     T[2, i] += tz
@@ -238,36 +139,32 @@ def make_book(features):
                 G[0, i] -= fx
                 G[1, i] -= fy
                 G[2, i] -= fz
-                tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], fx, fy, fz)
+                tx, ty, tz = cross(arm[0, i], arm[1, i], arm[2, i], fx, fy, fz)
                 T[0, i] += tx
                 T[1, i] += ty
                 T[2, i] += tz
-                bx, by, bz = (
-                    point.surface_arm[0, i],
-                    point.surface_arm[1, i],
-                    point.surface_arm[2, i],
-                )
+                bx, by, bz = surface_arm[0, i], surface_arm[1, i], surface_arm[2, i]
                 tx, ty, tz = cross(bx, by, bz, fx, fy, fz)
                 U[0, i] -= tx
                 U[1, i] -= ty
                 U[2, i] -= tz
 
-    return book
+    return store_forces
 
 
 @stage
-def outside(model, work, h):
-    """Gives every mover the impulse of the forces that are already known."""
-    for m in range(model.mover.shape[0]):
-        solid, entry = work.solid[m], work.tensor[m].entry
-        v, omega, F, T = solid.velocity, solid.spin, solid.force, solid.torque
-        inverse_mass = model.mover[m].inverse_mass
+def apply_known_forces(model, workspace, h):
+    """Changes the velocities of all dynamic bodies by the forces that are already known."""
+    for m in range(model.dynamic.shape[0]):
+        solid, entry = workspace.solid[m], workspace.tensor[m].entry
+        v, omega, F, T = solid.velocity, solid.angular_velocity, solid.force, solid.torque
+        inverse_mass = model.dynamic[m].inverse_mass
         for i in range(LANES):
             step = h * at(inverse_mass, i)
             v[0, i] += step * F[0, i]
             v[1, i] += step * F[1, i]
             v[2, i] += step * F[2, i]
-            tx, ty, tz = times(entry, i, T[0, i], T[1, i], T[2, i])
+            tx, ty, tz = tensor_times(entry, i, T[0, i], T[1, i], T[2, i])
             omega[0, i] += h * tx
             omega[1, i] += h * ty
             omega[2, i] += h * tz
@@ -275,58 +172,53 @@ def outside(model, work, h):
 
 @cache
 def make_impulses(features):
-    """Stage that adds the contact forces of all sides, and notes first touches."""
-    points, impacts = make_points(features), make_impacts(features)
-    sweep, warm, book = make_sweep(features), make_warm(features), make_book(features)
-    join_speeds = make_join_speeds(features)
+    """Stage that adds the contact forces of all half-pairs, and records contacts."""
+    contact_rows, impacts = make_contact_rows(features), make_impacts(features)
+    sweep, warm_start = make_sweep(features), make_warm_start(features)
+    store_forces = make_store_forces(features)
+    couple_finger_velocities = make_finger_velocity_coupling(features)
 
     @kernel
-    def correct(model, work, h, soft):
-        """One round over all contacts."""
-        for k in range(model.side.shape[0]):
-            if work.side[k].slots > 0:
-                here, A, B, ma, mb = ends(model, work, k)
-                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                sweep(here, a, b, A, B, ma, mb, model.side[k], h, soft)
-                join_speeds(model, work)
+    def sweep_all(model, workspace, h, soft):
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                sweep(operands_of(model, workspace, k), model.half_pair[k], h, soft)
+                couple_finger_velocities(model, workspace)
 
     @kernel
-    def finish(model, state, work, g, k, h, elapsed):
-        here = ends(model, work, k)[0]
-        owner, surface = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-        first, keeps = model.side[k].first_slot, work.lane[0].keeps
+    def finish(model, state, workspace, g, k, h, elapsed):
+        pair, first = operands_of(model, workspace, k), model.half_pair[k].first_slot
+        candidate = state.candidate[g, first : first + pair.points.shape[0]]
+        normal_force = pair.owner[0].normal_force_sum
         for i in range(LANES):
-            owner.pressed[i] = 0.0
-        candidate = state.candidate[g, first : first + here.shape[0]]
-        book(here, candidate, owner, surface, keeps, h, owner.pressed)
-        note_touch(model, state, work, g, k, owner.pressed, elapsed)
+            normal_force[i] = 0.0
+        store_forces(pair, candidate, workspace.lane[0].updates_memory, h, normal_force)
+        record_contacts(model, state, workspace, g, k, normal_force, elapsed)
 
     @kernel
-    def impulses(model, state, work, g, h, drifted, elapsed):
-        sides, touching = model.side.shape[0], 0
-        for k in range(sides):
-            touching += work.side[k].slots
-        if touching == 0:
+    def impulses(model, state, workspace, g, h, drifted, elapsed):
+        half_pairs, candidates = model.half_pair.shape[0], 0
+        for k in range(half_pairs):
+            candidates += workspace.half_pair[k].slots
+        if candidates == 0:
             return
-        place_tensors(model, work)
-        for k in range(sides):
-            if work.side[k].slots > 0:
-                points(model, state, work, g, k, work.lane[0].keeps, h)
-        # bodies collide with the speeds of now
-        outside(model, work, 0.5 * drifted)
-        impacts(model, work, h, drifted == 0.0)
-        outside(model, work, -0.5 * drifted)
-        correct(model, work, h, False)
-        outside(model, work, h)
-        for k in range(sides):
-            if work.side[k].slots > 0:
-                here, A, B, ma, mb = ends(model, work, k)
-                a, b = work.solid[model.side[k].owner], work.solid[model.side[k].surface]
-                warm(here, a, b, A, B, ma, mb)
-        join_speeds(model, work)
-        correct(model, work, h, True)
-        for k in range(sides):
-            if work.side[k].slots > 0:
-                finish(model, state, work, g, k, h, elapsed)
+        rotate_inertia(model, workspace)
+        for k in range(half_pairs):
+            if workspace.half_pair[k].slots > 0:
+                contact_rows(model, state, workspace, g, k, workspace.lane[0].updates_memory, h)
+        # velocities are half a step old; bodies collide with the present ones
+        apply_known_forces(model, workspace, 0.5 * drifted)
+        impacts(model, workspace, h, drifted == 0.0)
+        apply_known_forces(model, workspace, -0.5 * drifted)
+        sweep_all(model, workspace, h, False)
+        apply_known_forces(model, workspace, h)
+        for k in range(half_pairs):
+            if workspace.half_pair[k].slots > 0:
+                warm_start(operands_of(model, workspace, k))
+        couple_finger_velocities(model, workspace)
+        sweep_all(model, workspace, h, True)
+        for k in range(half_pairs):
+            if workspace.half_pair[k].slots > 0:
+                finish(model, state, workspace, g, k, h, elapsed)
 
     return impulses

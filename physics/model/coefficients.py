@@ -1,36 +1,37 @@
-"""The numbers of a model that follow from masses, materials and sizes: of any worlds at once.
+"""Columns of a model that depend on masses, materials and sizes, for any number of worlds at once.
 
-A scene's own model is the case of one world. Everything is elementwise over worlds and sides, so a
-world's numbers don't depend, to the last bit, on how many are worked out with them.
+A scene's own model is the case of one world. All formulas are elementwise over worlds and
+half-pairs, so a world's numbers are bitwise the same however many are computed with them.
 """
 
 import numpy as np
 
 from physics.model.normal_damping import damping_coefficients, rest_speed
-from physics.model.pairs import Layout, leverage, pair_stiffness
+from physics.model.pairs import Layout, pair_stiffness
 from physics.model.tangential import SHEAR_RATIO, shear_ratio, tangential_coefficients
 from physics.scene.compound import Compound
+from physics.scene.drives import Drive
 from physics.scene.parameters import Parameters
-from physics.scene.scene import Body, Drive, Ground
 from physics.scene.shapes import PLANE, Shape
+from physics.scene.solids import Body, Ground
 
 Array = np.ndarray
 Columns = dict[str, Array]
-# How much faster a cube rocks on its face than it bobs, in stiffness by mass. A plate rocks twice
-# as fast again, and would outrun the step: its contacts are that much softer
-_CUBE = 9.0 / 8.0
-# Floor of the restitution of such bodies by springs, times 1 - soft and contact_resolution. Damping
-# that ends a landing within a step is too strong for rocking that is faster than the landing: a
-# thin rod, or a plate, rose to six times its energy at e = 0, and one that landed flat rebounded
-# with up to 1.3 v. The shorter a step is for the contact, the stronger the damping may be
-_THIN = 0.24
-# of the impulse law: the damping ratio of a soft contact, and the steps of free fall whose speed
+
+# Stiffness per mass of a cube's rocking on a face, relative to bobbing. Plates and rods rock faster
+# still and would outrun the time step, so their contacts are made softer by the ratio
+_CUBE_ROCKING = 9.0 / 8.0
+# Lower bound of the restitution of such slim bodies under the spring law, as a multiple of
+# contact_resolution (1 - softness). Damping that ends a landing within one step is too strong for
+# rocking that is faster than the landing: the body would gain energy (docs/decisions)
+_SLIM_RESTITUTION = 0.24
+# Impulse law: damping ratio of a soft contact, and the number of steps of free fall whose speed
 # counts as rest
 SOFT_DAMPING, REST_STEPS = 1.0, 4.0
 
 
 def _of_solids(bodies: Array, others: list[float]) -> Array:
-    """[n, solids]: a value [n, bodies] of the bodies, beside those of the other solids."""
+    """[n, solids]: values [n, bodies] of the bodies, followed by those of the other solids."""
     rest = np.broadcast_to(np.array(others, dtype=float), (len(bodies), len(others)))
     return np.concatenate([bodies, rest], axis=1)
 
@@ -45,16 +46,16 @@ def _inertia(layout: Layout, p: Parameters) -> Array:
     return moments
 
 
-def of_movers(layout: Layout, p: Parameters) -> Columns:
-    """Columns [n, movers, ...] of MOVER, by name: bodies, then drives."""
-    n, drives = len(p.mass), layout.solids[layout.bodies : layout.movers]
-    endless = np.full((n, len(drives), 3), np.inf)
-    inertia = np.concatenate([_inertia(layout, p), endless], axis=1)
-    # the carriage carries a drive; without a negative zero, which sums would lose
-    weight = np.zeros((n, layout.movers, 3))
+def dynamic_columns(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, dynamic bodies, ...] of DYNAMIC, by name."""
+    n, drives = len(p.mass), layout.solids[layout.bodies : layout.dynamic_count]
+    infinite = np.full((n, len(drives), 3), np.inf)
+    inertia = np.concatenate([_inertia(layout, p), infinite], axis=1)
+    # a drive's carriage holds its weight. + 0.0 turns -0.0 into 0.0
+    weight = np.zeros((n, layout.dynamic_count, 3))
     weight[:, : layout.bodies] = p.mass[:, :, None] * layout.gravity + 0.0
     mass = [d.mass for d in drives if isinstance(d, Drive)]
-    shapes = [s.shape for s in layout.solids[: layout.movers] if not isinstance(s, Ground)]
+    shapes = [s.shape for s in layout.solids[: layout.dynamic_count] if not isinstance(s, Ground)]
     core = [_core_reach(shape, layout.fidelity.geometry == "shape") for shape in shapes]
     return {
         "core_reach": _of_solids(p.size, [1.0] * len(drives)) * np.array(core),
@@ -65,12 +66,12 @@ def of_movers(layout: Layout, p: Parameters) -> Columns:
     }
 
 
-def of_sides(layout: Layout, p: Parameters) -> Columns:
-    """Columns [n, sides, ...] of SIDE, by name."""
-    solids, sides, fidelity = layout.solids, layout.sides, layout.fidelity
+def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, half-pairs, ...] of HALF_PAIR, by name."""
+    solids, half_pairs, fidelity = layout.solids, layout.half_pairs, layout.fidelity
     rest = solids[layout.bodies :]
-    a = np.array([side.owner for side in sides], dtype=int)
-    b = np.array([side.other for side in sides], dtype=int)
+    a = np.array([half_pair.owner for half_pair in half_pairs], dtype=int)
+    b = np.array([half_pair.other for half_pair in half_pairs], dtype=int)
 
     masses = [s.mass if isinstance(s, Drive) else np.inf for s in rest]
     mass = _of_solids(p.mass, masses)
@@ -87,29 +88,28 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
     inverse = 1.0 / mass
     pair_mass = 1.0 / (inverse[:, a] + inverse[:, b])
     along, across = layout.modes[:, 0], layout.modes[:, 1]
-    soft = np.minimum(1.0, _CUBE / np.maximum(along[a], along[b]))
+    soft = np.minimum(1.0, _CUBE_ROCKING / np.maximum(along[a], along[b]))
     stiffness = np.where(np.isnan(given), pair_mass * omega**2 * soft, given)
-    # mass that a tangential force at the surface feels, turning included
+    # effective mass of a tangential force at the surface, rotation included
     shear = 1.0 / (mass / across)
     shear_mass = 1.0 / (shear[:, a] + shear[:, b])
-    levers = np.array([leverage(solid) for solid in solids])
     shear_stiffness, shear_damping = tangential_coefficients(
         stiffness,
         pair_mass,
         shear_mass,
-        levers[a] + levers[b],
+        layout.leverage[a] + layout.leverage[b],
         np.where(np.isnan(given), shear_ratio(fidelity.contact_resolution), SHEAR_RATIO),
         h,
     )
 
     least = _of_solids(_inertia(layout, p).min(axis=-1), [np.inf] * len(rest))
-    turns = (a < layout.bodies) | (b < layout.bodies)  # a tool that meets the ground never does
+    turns = (a < layout.bodies) | (b < layout.bodies)  # a drive on the ground never rotates
     turning = np.where(turns, 1.0 / least[:, a] + 1.0 / least[:, b], 1.0)
     twist_stiffness, twist_damping = tangential_coefficients(
         omega**2 / turning,
         1.0 / turning,
         1.0 / turning,
-        np.zeros(len(sides)),
+        np.zeros(len(half_pairs)),
         np.array(SHEAR_RATIO),
         h,
     )
@@ -118,32 +118,32 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
         slowest = np.full(stiffness.shape, REST_STEPS * g * h)
     else:
-        floor = _THIN * fidelity.contact_resolution * (1.0 - soft)
+        floor = _SLIM_RESTITUTION * fidelity.contact_resolution * (1.0 - soft)
         damping = damping_coefficients(np.maximum(restitution, floor), fidelity.damping)
         slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
 
-    # grounds have no width that counts, and statics none that limits the skin
+    # only the widths of dynamic bodies limit the skin
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
-    moving = np.where(np.arange(len(solids)) < layout.movers, widths, np.inf)
+    moving = np.where(np.arange(len(solids)) < layout.dynamic_count, widths, np.inf)
     reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
-    # of a compound's part, about its own centre
     surface_reach = reach[:, b]
-    for k, side in enumerate(sides):
-        if side.part >= 0:
-            surface_reach[:, k] = layout.parts[side.part][1].shape.reach * size[:, side.other]
-    # of a wide face few samples lie where a narrow one touches it, so the narrow one's bear the
-    # more: half and half of equal ones. Which of its faces a solid touches with isn't known: it
-    # counts as the cube of its volume
-    shared = np.array([side.shared for side in sides], dtype=bool)
+    for k, half_pair in enumerate(half_pairs):
+        if half_pair.part >= 0:  # about the part's own centre
+            part = layout.parts[half_pair.part][1]
+            surface_reach[:, k] = part.shape.reach * size[:, half_pair.other]
+    # Where a narrow face touches a wide one, few samples of the wide one are in contact, so the
+    # narrow one's carry more of the load; equal faces carry half each. Which face touches isn't
+    # known: a solid counts as the cube of its volume
+    shared = np.array([half_pair.both_sampled for half_pair in half_pairs], dtype=bool)
     volumes = np.array([1.0 if isinstance(s, Ground) else s.shape.volume for s in solids])
     breadth = np.cbrt(volumes) * size
     own = np.where(shared, breadth[:, a], 1.0)
     other = np.where(shared, breadth[:, b], 1.0)
     own, other = own * own, other * other
-    sampled = np.array([side.samples.radius for side in sides])
-    rounded = np.array([side.surface.radius for side in sides])
-    cores = np.array([side.surface.parameters for side in sides]).reshape(-1, 3)
-    plane = np.array([side.surface.kind == PLANE for side in sides], dtype=bool)
+    sampled = np.array([half_pair.samples.radius for half_pair in half_pairs])
+    rounded = np.array([half_pair.surface.radius for half_pair in half_pairs])
+    cores = np.array([half_pair.surface.parameters for half_pair in half_pairs]).reshape(-1, 3)
+    plane = np.array([half_pair.surface.kind == PLANE for half_pair in half_pairs], dtype=bool)
     return {
         "core": cores * np.where(plane, 1.0, size[:, b])[:, :, None],
         "owner_radius": sampled * size[:, a],
@@ -152,7 +152,7 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "surface_reach": surface_reach,
         "owner_size": size[:, a],
         "surface_size": size[:, b],
-        "share": np.where(shared, other / (own + other), 1.0),
+        "load_share": np.where(shared, other / (own + other), 1.0),
         "skin": fidelity.skin * np.minimum(moving[:, a], moving[:, b]),
         "stiffness": stiffness,
         "damping": damping,
@@ -162,7 +162,7 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
         "owner_inverse_mass": inverse[:, a],
         "surface_inverse_mass": inverse[:, b],
         "surface_centre": _surface_centres(layout, size[:, b]),
-        "yielding": _yielding(layout, p),
+        "surface_inverse_inertia": _surface_inverse_inertia(layout, p),
         "shear_stiffness": shear_stiffness,
         "shear_damping": shear_damping,
         "friction": friction,
@@ -172,35 +172,40 @@ def of_sides(layout: Layout, p: Parameters) -> Columns:
 
 
 def _surface_centres(layout: Layout, size: Array) -> Array:
-    """[n, sides, 3] m: a part's frame lies apart from the centre of its compound."""
+    """[n, half-pairs, 3] m: centre of mass of a compound in the frame of its part."""
     centres = np.zeros((*size.shape, 3))
-    for k, side in enumerate(layout.sides):
-        if side.part >= 0:
-            part = layout.parts[side.part][1]
+    for k, half_pair in enumerate(layout.half_pairs):
+        if half_pair.part >= 0:
+            part = layout.parts[half_pair.part][1]
             centres[:, k] = -size[:, k, None] * (part.rotation.T @ np.array(part.position))
     return centres
 
 
-def _yielding(layout: Layout, p: Parameters) -> Array:
-    """[n, sides, 3] 1/(kg m^2): inverse moments of the surface's body, in the surface's frame.
+def _surface_inverse_inertia(layout: Layout, p: Parameters) -> Array:
+    """[n, half-pairs, 3] 1/(kg m^2): inverse moments of the surface's body, in the surface's frame.
 
-    Only a sphere meets a body with all of the pair's damping at one point, however far from the
-    body's centre: it must know how easily the body turns there. Of others each of many samples has
-    a small share. Where a part lies askew in its compound, the tensor A there isn't diagonal: for
-    m . A m stands the bound sum_i m_i^2 sum_j |A_ij|, which never damps too much.
+    Zero except where the owner has a single sample, as a sphere does. That sample has all of the
+    pair's damping at one point, however far from the surface's centre of mass, so the law needs the
+    effective mass there; many samples have a small part each. Where a part is rotated within its
+    compound the tensor A isn't diagonal; m . A m is then replaced by its upper bound
+    sum_i m_i^2 sum_j |A_ij|, so the damping is never too strong.
     """
     inverse = 1.0 / _inertia(layout, p)
-    yielding = np.zeros((len(inverse), len(layout.sides), 3))
-    for k, side in enumerate(layout.sides):
-        if side.other < layout.bodies and len(side.samples.weights) == 1:
-            turn = np.eye(3) if side.part < 0 else layout.parts[side.part][1].rotation
-            tensor = np.einsum("ki,nk,kj->nij", turn, inverse[:, side.other], turn)
-            yielding[:, k] = np.abs(tensor).sum(axis=-1)
-    return yielding
+    columns = np.zeros((len(inverse), len(layout.half_pairs), 3))
+    for k, half_pair in enumerate(layout.half_pairs):
+        if half_pair.other < layout.bodies and len(half_pair.samples.weights) == 1:
+            part = half_pair.part
+            rotation = np.eye(3) if part < 0 else layout.parts[part][1].rotation
+            tensor = np.einsum("ki,nk,kj->nij", rotation, inverse[:, half_pair.other], rotation)
+            columns[:, k] = np.abs(tensor).sum(axis=-1)
+    return columns
 
 
 def _core_reach(shape: Shape, rounded: bool) -> float:
-    """Farthest point in m from a shape's centre that turning moves: roundings turn in place."""
+    """Largest distance in m from the centre of a point that rotation moves.
+
+    A rounded surface rotates in place, so the rounding radius doesn't count.
+    """
     if isinstance(shape, Compound) and shape.only is not None:
         shape = shape.only
     if isinstance(shape, Compound) or not rounded:
@@ -208,8 +213,8 @@ def _core_reach(shape: Shape, rounded: bool) -> float:
     return shape.reach - shape.surface(0.0).radius
 
 
-def of_parts(layout: Layout, p: Parameters) -> Columns:
-    """Columns [n, parts, ...] of PART, by name."""
+def compound_part_columns(layout: Layout, p: Parameters) -> Columns:
+    """Columns [n, parts, ...] of COMPOUND_PART, by name."""
     owners = np.array([solid for solid, _ in layout.parts], dtype=int)
     places = np.array([part.position for _, part in layout.parts]).reshape(-1, 3)
     size = _of_solids(p.size, [1.0] * (len(layout.solids) - layout.bodies))

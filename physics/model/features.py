@@ -40,4 +40,4 @@ class Features(NamedTuple):
     drives: bool
     gripper: bool
     compound: bool
-    varied: bool
+    per_world_parameters: bool

@@ -1,9 +1,9 @@
-"""A group: worlds side by side, one to a vector lane, as the stages work on them.
+"""Lane groups: sixteen worlds side by side, one per SIMD lane, as the kernels work on them.
 
-State keeps worlds one after another. A kernel takes LANES of them at a time into a `Work`, whose
-arrays have the lane as their last axis, advances them together and writes them back. Every stage
-loops over the lanes without a branch, which LLVM turns into vector instructions: many worlds for
-the price of a few. Lanes never mix, so a world's result doesn't depend on what runs beside it.
+State keeps worlds one after another. A kernel loads LANES of them at a time into a `Workspace`,
+whose arrays have the lane as their last axis, advances them together and stores them. Every stage
+loops over the lanes without a branch, so LLVM turns the loop into vector instructions. Lanes never
+mix: a world's result does not depend on the worlds in the other lanes.
 """
 
 from functools import cache
@@ -12,7 +12,7 @@ import numpy as np
 
 from physics.jit import LANES, kernel, stage
 from physics.model.features import Features
-from physics.model.state import FIRST_POSITION, FIRST_TOUCH, PRESSED
+from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -20,45 +20,51 @@ Array = np.ndarray
 
 @cache
 def make_constants(features: Features):
-    """Stage that tells the constants of group g: one row a mover and side."""
-    varied = features.varied
+    """Stage that returns the model of lane group g: one row per dynamic body and half-pair."""
+    per_world_parameters = features.per_world_parameters
 
     @stage
     def constants(model, g):
-        if varied:
-            mover, side, part = model.mover[g], model.side[g], model.part[g]
-            return Model(mover, side, part, model.cover, model.static, model.sample)
+        if per_world_parameters:
+            return Model(
+                model.dynamic[g],
+                model.half_pair[g],
+                model.compound_part[g],
+                model.hidden_face,
+                model.static,
+                model.sample,
+            )
         return model
 
     return constants
 
 
 @kernel
-def load_forces(state, work, g, m, i):
-    """Takes a mover's force and torque into lane i."""
-    row, solid = state.mover[g * LANES + i, m], work.solid[m]
+def load_forces(state, workspace, g, m, i):
+    """Loads force and torque of dynamic body m into lane i."""
+    row, solid = state.dynamic[g * LANES + i, m], workspace.solid[m]
     for c in range(3):
         solid.force[c, i] = row.force[c]
         solid.torque[c, i] = row.torque[c]
 
 
 @stage
-def count_slots(work, k):
-    """Notes how many slots a side's longest list has."""
-    side = work.side[k]
+def count_slots(workspace, k):
+    """Updates the length of the longest list of half-pair k."""
+    half_pair = workspace.half_pair[k]
     slots = 0
     for i in range(LANES):
-        slots = max(slots, side.count[i])
-    side.slots = slots
+        slots = max(slots, half_pair.count[i])
+    half_pair.slots = slots
 
 
 @stage
-def load(model, state, work, chosen, g):
-    """Takes the chosen worlds of group g into the lanes; other lanes rest at the origin.
+def load(model, state, workspace, chosen, g):
+    """Loads the chosen worlds of group g into the lanes; the other lanes rest at the origin.
 
-    Returns how many there are; nothing is taken if none.
+    Returns how many there are; loads nothing if there are none.
     """
-    lane, count = work.lane[0], 0
+    lane, count = workspace.lane[0], 0
     for i in range(LANES):
         w = g * LANES + i
         if w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0:
@@ -69,25 +75,26 @@ def load(model, state, work, chosen, g):
         w = g * LANES + i
         active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
         lane.active[i] = 1 if active else 0
-        lane.keeps[i] = 1 if active else 0
-        lane.stale[i] = 1 if active and state.world[w].stale != 0 else 0
+        lane.updates_memory[i] = 1 if active else 0
+        lane.needs_refresh[i] = 1 if active and state.world[w].needs_refresh != 0 else 0
         lane.start[i] = state.world[w].time if active else 0.0
-        for m in range(model.mover.shape[0]):
-            solid = work.solid[m]
-            solid.swing[i] = 0.0
+        for m in range(model.dynamic.shape[0]):
+            solid = workspace.solid[m]
+            solid.rotation_bound[i] = 0.0
             for c in range(3):
-                solid.shift[c, i] = 0.0
+                solid.displacement[c, i] = 0.0
             if active:
-                row = state.mover[w, m]
+                row = state.dynamic[w, m]
                 for c in range(3):
                     solid.position[c, i] = row.position[c]
                     solid.momentum[c, i] = row.momentum[c]
                     solid.angular_momentum[c, i] = row.angular_momentum[c]
                     solid.reference[c, i] = row.reference[c]
                     solid.reference_velocity[c, i] = row.reference_velocity[c]
+                solid.reference_time[i] = row.reference_time
                 for c in range(4):
                     solid.orientation[c, i] = row.orientation[c]
-                load_forces(state, work, g, m, i)
+                load_forces(state, workspace, g, m, i)
             else:
                 for c in range(3):
                     solid.position[c, i] = 0.0
@@ -97,73 +104,76 @@ def load(model, state, work, chosen, g):
                     solid.reference_velocity[c, i] = 0.0
                     solid.force[c, i] = 0.0
                     solid.torque[c, i] = 0.0
+                solid.reference_time[i] = 0.0
                 for c in range(4):
                     solid.orientation[c, i] = 1.0 if c == 3 else 0.0
-        for k in range(model.side.shape[0]):
-            side = work.side[k]
+        for k in range(model.half_pair.shape[0]):
+            half_pair = workspace.half_pair[k]
             if active:
-                found = state.side[w, k]
-                side.count[i] = found.count
-                side.travel[i] = found.travel
-                side.first_touch[i] = state.touch[k, FIRST_TOUCH, w]
-                side.pressed[i] = state.touch[k, PRESSED, w]
-                side.bore[i] = found.bore
+                saved = state.half_pair[w, k]
+                half_pair.count[i] = saved.count
+                half_pair.remaining_skin[i] = saved.remaining_skin
+                half_pair.first_touch[i] = state.touch[k, FIRST_TOUCH, w]
+                half_pair.previous_normal_force[i] = state.touch[k, NORMAL_FORCE, w]
+                half_pair.previous_weight[i] = saved.previous_weight
             else:
-                side.count[i] = 0
-                side.travel[i] = 1e300
-                side.first_touch[i] = 0.0
-                side.pressed[i] = 0.0
-                side.bore[i] = 0.0
-    for k in range(model.side.shape[0]):
-        count_slots(work, k)
+                half_pair.count[i] = 0
+                half_pair.remaining_skin[i] = 1e300
+                half_pair.first_touch[i] = 0.0
+                half_pair.previous_normal_force[i] = 0.0
+                half_pair.previous_weight[i] = 0.0
+    for k in range(model.half_pair.shape[0]):
+        count_slots(workspace, k)
     return count
 
 
 @stage
-def note_touch(model, state, work, g, k, pressed, elapsed):
-    """Notes how hard a side presses, `pressed` [N], and when and where it does so first."""
-    side, keeps = work.side[k], work.lane[0].keeps
-    first, noted, start = side.first_touch, side.pressed, work.lane[0].start
-    new = 0
+def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
+    """Records a half-pair's normal force [LANES] N, and time and place of its first contact."""
+    half_pair, updates_memory = workspace.half_pair[k], workspace.lane[0].updates_memory
+    first, previous = half_pair.first_touch, half_pair.previous_normal_force
+    start, new = workspace.lane[0].start, 0
     for i in range(LANES):
-        noted[i] = pressed[i] if keeps[i] != 0 else noted[i]
-        before = (pressed[i] <= 0.0) | (first[i] <= start[i] + elapsed) | (keeps[i] == 0)
-        new += 0 if before else 1
+        previous[i] = normal_force[i] if updates_memory[i] != 0 else previous[i]
+        known = first[i] <= start[i] + elapsed
+        nothing_new = (normal_force[i] <= 0.0) | known | (updates_memory[i] == 0)
+        new += 0 if nothing_new else 1
     if new > 0:
-        note_first(model, state, work, g, k, pressed, elapsed)
+        record_first_contact(model, state, workspace, g, k, normal_force, elapsed)
 
 
 @kernel
-def note_first(model, state, work, g, k, pressed, elapsed):
-    """Notes when and where a side presses for the first time, in the lanes in which it does."""
-    first, keeps, start = work.side[k].first_touch, work.lane[0].keeps, work.lane[0].start
-    position = work.solid[min(model.side[k].owner, model.side[k].surface)].position
+def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
+    """Records time and place of the first contact of a half-pair, in the lanes that have it now."""
+    first, updates_memory = workspace.half_pair[k].first_touch, workspace.lane[0].updates_memory
+    half_pair, start = model.half_pair[k], workspace.lane[0].start
+    position = workspace.solid[min(half_pair.owner, half_pair.surface)].position
     for i in range(LANES):
         time = start[i] + elapsed
-        if pressed[i] > 0.0 and not first[i] <= time and keeps[i] != 0:
+        if normal_force[i] > 0.0 and not first[i] <= time and updates_memory[i] != 0:
             first[i] = time
             for c in range(3):
                 state.touch[k, FIRST_POSITION + c, g * LANES + i] = position[c, i]
 
 
 @stage
-def end_look(model, state, work, g):
-    """Gives lanes whose state wasn't set their forces back, and lets them remember again."""
-    lane = work.lane[0]
+def end_refresh(model, state, workspace, g):
+    """Restores the forces of lanes that needed no refresh; all lanes update their memory again."""
+    lane = workspace.lane[0]
     for i in range(LANES):
-        lane.keeps[i] = lane.active[i]
-        if lane.active[i] and not lane.stale[i]:
-            for m in range(model.mover.shape[0]):
-                load_forces(state, work, g, m, i)
+        lane.updates_memory[i] = lane.active[i]
+        if lane.active[i] and not lane.needs_refresh[i]:
+            for m in range(model.dynamic.shape[0]):
+                load_forces(state, workspace, g, m, i)
 
 
 @kernel
-def store(model, state, work, g, i, time):
-    """Writes lane i back to its world, at `time` s."""
+def store(model, state, workspace, g, i, time):
+    """Stores lane i into its world, at `time` s; quaternions with w >= 0."""
     w = g * LANES + i
     state.world[w].time = time
-    for m in range(model.mover.shape[0]):
-        solid, row = work.solid[m], state.mover[w, m]
+    for m in range(model.dynamic.shape[0]):
+        solid, row = workspace.solid[m], state.dynamic[w, m]
         for c in range(3):
             row.position[c] = solid.position[c, i]
             row.momentum[c] = solid.momentum[c, i]
@@ -171,13 +181,17 @@ def store(model, state, work, g, i, time):
             row.reference[c] = solid.reference[c, i]
             row.force[c] = solid.force[c, i]
             row.torque[c] = solid.torque[c, i]
+        row.reference_time = solid.reference_time[i]
+        # q and -q are the same rotation
+        sign = -1.0 if solid.orientation[3, i] < 0.0 else 1.0
         for c in range(4):
-            row.orientation[c] = solid.orientation[c, i]
-    for k in range(model.side.shape[0]):
-        side, found = work.side[k], state.side[w, k]
-        found.count = side.count[i]
-        found.travel = side.travel[i]
-        state.touch[k, FIRST_TOUCH, w] = side.first_touch[i]
-        # by impulses `choose` may have emptied a list after the search
-        state.touch[k, PRESSED, w] = side.pressed[i] if side.count[i] > 0 else 0.0
-        found.bore = side.bore[i]
+            row.orientation[c] = sign * solid.orientation[c, i]
+    for k in range(model.half_pair.shape[0]):
+        half_pair, saved = workspace.half_pair[k], state.half_pair[w, k]
+        saved.count = half_pair.count[i]
+        saved.remaining_skin = half_pair.remaining_skin[i]
+        state.touch[k, FIRST_TOUCH, w] = half_pair.first_touch[i]
+        # with impulses, reducing a manifold may have emptied a list after the search
+        present = half_pair.count[i] > 0
+        state.touch[k, NORMAL_FORCE, w] = half_pair.previous_normal_force[i] if present else 0.0
+        saved.previous_weight = half_pair.previous_weight[i]

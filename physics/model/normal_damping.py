@@ -9,7 +9,7 @@ import numpy as np
 Array = np.ndarray
 
 
-# below this restitution the approach ends within the step's resolution anyway
+# below this restitution an impact ends within one step in any case
 _LEAST_RESTITUTION = 5e-4
 
 
@@ -41,7 +41,7 @@ def clamped_dashpot_restitution(zeta: float) -> float:
 
 
 def damping_coefficients(restitution: Array, law: str) -> Array:
-    """As `damping_coefficient`, of any number of contacts: each value is worked out once."""
+    """`damping_coefficient` of an array of restitutions; equal values are computed once."""
     values, where = np.unique(restitution, return_inverse=True)
     found = [damping_coefficient(e, law) for e in values.tolist()]
     return np.array(found)[where].reshape(restitution.shape)
@@ -49,7 +49,7 @@ def damping_coefficients(restitution: Array, law: str) -> Array:
 
 @lru_cache(maxsize=4096)
 def damping_coefficient(restitution: float, law: str) -> float:
-    """The law's dimensionless damping: a of "overlap", the damping ratio zeta of "dashpot"."""
+    """Dimensionless damping: a of the "hunt_crossley" law, the ratio zeta of the "dashpot"."""
     e = max(restitution, _LEAST_RESTITUTION)
     if e >= 1.0:
         return 0.0
@@ -66,13 +66,13 @@ def damping_coefficient(restitution: float, law: str) -> float:
 
 
 def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:
-    """Floor of the impact speed, m/s: a body at rest under its weight is damped half critically.
+    """Lower bound of the impact speed, m/s: it damps a body at rest at half of critical.
 
     Args:
-        damping: a of the law, of any number of contacts.
+        damping: coefficient of the law, of any number of contacts.
         gravity: m/s^2.
-        omega: rad/s, of each.
+        omega: rad/s, natural frequency of each contact.
     """
-    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega. With all of that a
-    # flat or a tall block, whose rocking is faster than its bobbing, would chatter and creep
+    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega. With critical damping a
+    # flat or a tall block, which rocks faster than it bobs, would chatter and creep
     return np.maximum(damping * gravity / omega, 1e-9)

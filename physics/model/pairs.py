@@ -1,7 +1,7 @@
-"""Layout: what of a scene's contacts stays as it is when masses, materials and sizes change.
+"""Which solids can touch, and with which samples: what stays when per-world parameters change.
 
-Solids are the movers, then the statics. A pair of solids meets through one or two sides: the
-samples of an owner against the surface of another.
+Solids are the dynamic bodies (bodies, then drives), then the statics. A pair of solids touches
+through one or two half-pairs: the samples of an owner against the surface of the other solid.
 """
 
 import math
@@ -10,23 +10,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.model.rocking import fastest
-from physics.scene.compound import Compound, Group
+from physics.model.rocking import fastest_modes, rocking_leverage
+from physics.scene.compound import Compound, SampleSet
+from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
+from physics.scene.material import Material
 from physics.scene.part import Part
-from physics.scene.scene import Body, Drive, Ground, Material, Scene, Static
+from physics.scene.scene import Scene
 from physics.scene.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
+from physics.scene.solids import Body, Ground, Static
 
 Array = np.ndarray
 Solid = Body | Drive | Static | Ground
 
 
-class Side(NamedTuple):
+class HalfPair(NamedTuple):
     """The samples of solid `owner` against the surface of solid `other`.
 
-    With `shared`, both of a pair carry samples, and bear a part of its load each. A `part` is that
-    of `Layout.parts` whose surface it is, -1 where it is the solid's own. Of `sharp`, see
-    `surfaces.box_distance`.
+    Attributes:
+        owner: index of a solid.
+        other: likewise.
+        samples: of the owner.
+        surface: of the other solid.
+        partners: particles of the surface, if it consists of particles.
+        both_sampled: the other solid's samples are tested too, so each carries a share of the load.
+        part: index into `Layout.parts` of the compound part whose surface it is, or -1.
+        face_normals: see `distances.box_distance`.
     """
 
     owner: int
@@ -34,13 +43,13 @@ class Side(NamedTuple):
     samples: Samples
     surface: Surface
     partners: Samples | None
-    shared: bool = False
+    both_sampled: bool = False
     part: int = -1
-    sharp: bool = False
+    face_normals: bool = False
 
     @property
     def capacity(self) -> int:
-        """Candidates that it has room for: all its samples, or eight partners to each particle."""
+        """Room for candidates: all samples, or eight partners per particle."""
         n = len(self.samples.weights)
         if self.partners is None:
             return n
@@ -49,41 +58,49 @@ class Side(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Solids and sides of a scene at a fidelity.
+    """Solids and half-pairs of a scene at a fidelity.
 
     Attributes:
-        solids: movers, then statics.
-        movers: how many of them move.
-        bodies: how many of these are bodies, which come first.
-        sides: in a fixed order.
-        parts: of compounds, and the solid that each belongs to; none if no side meets any.
-        modes: [solids, 2] see `landing.fastest`; 1 for what doesn't turn.
+        solids: dynamic bodies, then statics.
+        dynamic_count: number of dynamic bodies.
+        bodies: how many of them are bodies, which come first.
+        half_pairs: in a fixed order.
+        parts: (solid, part) of compounds; empty if no half-pair tests any of them.
+        modes: [solids, 2] see `rocking.fastest_modes`; 1 for what doesn't rotate.
+        leverage: [solids] see `rocking.rocking_leverage`; 0 for what isn't a body.
         gravity: [3] m/s^2.
         fidelity: of the physics.
     """
 
     solids: tuple[Solid, ...]
-    movers: int
+    dynamic_count: int
     bodies: int
-    sides: tuple[Side, ...]
+    half_pairs: tuple[HalfPair, ...]
     parts: tuple[tuple[int, Part], ...]
     modes: Array
+    leverage: Array
     gravity: Array
     fidelity: Fidelity
 
     @classmethod
     def of(cls, scene: Scene, fidelity: Fidelity) -> "Layout":
         """The layout of a scene."""
-        solids: tuple[Solid, ...] = (*scene.bodies, *scene.tools, *scene.statics)
+        solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *scene.statics)
         parts = tuple((i, part) for i, solid in enumerate(solids) for part in _parts(solid))
-        sides = tuple(_sides(scene, fidelity, parts))
+        half_pairs = tuple(_half_pairs(scene, fidelity, parts))
+        modes = [(1.0, 1.0)] * len(solids)
+        leverage = [0.0] * len(solids)
+        for i, body in enumerate(scene.bodies):
+            modes[i] = fastest_modes(body.shape, 0.5 * body.shape.width)  # for every fidelity
+            leverage[i] = rocking_leverage(_single(body.shape))
         return cls(
             solids=solids,
-            movers=len(scene.bodies) + len(scene.tools),
+            dynamic_count=len(scene.bodies) + len(scene.driven_bodies),
             bodies=len(scene.bodies),
-            sides=sides,
-            parts=parts if any(side.part >= 0 for side in sides) else (),
-            modes=np.array([_fastest(solid) for solid in solids]).reshape(-1, 2),
+            half_pairs=half_pairs,
+            parts=parts if any(half_pair.part >= 0 for half_pair in half_pairs) else (),
+            modes=np.array(modes).reshape(-1, 2),
+            leverage=np.array(leverage),
             gravity=np.array(scene.gravity),
             fidelity=fidelity,
         )
@@ -96,63 +113,31 @@ def spacing(shape: Shape, scene: Scene, fidelity: Fidelity) -> float:
 
 
 def pair_stiffness(a: Material, b: Material) -> float:
-    """Stiffness in N/m of two surfaces in contact that name one; NaN where neither does."""
+    """Stiffness in N/m of two surfaces in contact; NaN where neither material gives one."""
     given = [m.stiffness for m in (a, b) if m.stiffness is not None]
     return 1.0 / sum(1.0 / k for k in given) if given else math.nan
 
 
-def leverage(solid: Solid) -> float:
-    """See `tangential_coefficients`: of a box that lies on its widest face; balls don't rock."""
-    shape = _plain(solid.shape) if isinstance(solid, Body) else None
-    if isinstance(shape, Compound):
-        return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0))
-    if not isinstance(shape, Box):
-        return 0.0
-    height, *sides = sorted(shape.half_extents)
-    # three quarters of a face's weight lie on the two edges across the motion, one on its middle
-    return sum(height**2 / (0.75 * side**2) for side in sides) / 2.0
-
-
-def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> float:
-    """As `leverage`, of a solid with samples: the least of its six sides that can be lain on."""
-    found, least = [], (1e-6 * np.abs(positions).max()) ** 2  # of what is no line but round-off
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        for height in (positions[:, axis] + radii, -positions[:, axis] + radii):
-            lowest = height >= height.max() - 1e-6 * np.abs(height).max()
-            share = weights[lowest] / weights[lowest].sum()
-            places = positions[lowest][:, others]
-            spread = share @ (places - share @ places) ** 2
-            if np.all(spread > least):
-                found.append(float(height.max() ** 2 * np.mean(1.0 / spread)))
-    return min(found, default=0.0)
-
-
-def _plain(shape: Shape) -> Shape:
-    """The shape itself; of a Compound of one part that lies as it does, the part's."""
+def _single(shape: Shape) -> Shape:
+    """The shape itself; for a Compound of one part in the same pose, that part's shape."""
     only = shape.only if isinstance(shape, Compound) else None
     return shape if only is None else only
 
 
 def _parts(solid: Solid) -> tuple[Part, ...]:
-    """The parts of a compound that have a surface each; of other solids none."""
+    """The parts of a compound, which have a surface each; none for other solids."""
     if isinstance(solid, Ground):
         return ()
-    shape = _plain(solid.shape)
+    shape = _single(solid.shape)
     return tuple(shape.parts) if isinstance(shape, Compound) else ()  # type: ignore[arg-type]
 
 
-def _fastest(solid: Solid) -> tuple[float, float]:
-    """At one spacing for all fidelities."""
-    if not isinstance(solid, Body):
-        return 1.0, 1.0
-    return fastest(solid.shape, 0.5 * solid.shape.width)
-
-
-def _sides(scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]) -> Iterator[Side]:
-    """All sides through which the scene's solids can meet, in a fixed order."""
-    solids: list[Solid] = [*scene.bodies, *scene.tools, *scene.statics]
-    movers = len(scene.bodies) + len(scene.tools)
+def _half_pairs(
+    scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
+) -> Iterator[HalfPair]:
+    """All half-pairs through which the scene's solids can touch, in a fixed order."""
+    solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
+    dynamic_count = len(scene.bodies) + len(scene.driven_bodies)
 
     def rounding(solid: Body | Drive | Static) -> float:
         return fidelity.rounding * solid.shape.width / 2.0
@@ -160,54 +145,57 @@ def _sides(scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
     def particles(solid: Body | Drive | Static) -> Samples:
         return solid.shape.particles(spacing(solid.shape, scene, fidelity))
 
-    def groups(solid: Body | Drive | Static) -> tuple[Group, ...]:
+    def sample_sets(solid: Body | Drive | Static) -> tuple[SampleSet, ...]:
         if fidelity.geometry == "particle" and isinstance(solid, Body):
-            return (Group(particles(solid), False),)
-        shape, apart = solid.shape, spacing(solid.shape, scene, fidelity)
+            return (SampleSet(particles(solid), False),)
+        shape, distance = solid.shape, spacing(solid.shape, scene, fidelity)
         if isinstance(shape, Compound):
-            return shape.groups(apart, rounding(solid))
-        return (Group(shape.samples(apart, rounding(solid)), isinstance(shape, Box)),)
+            return shape.sample_sets(distance, rounding(solid))
+        return (SampleSet(shape.samples(distance, rounding(solid)), isinstance(shape, Box)),)
 
-    def meetings(owner: int, other: int) -> list[Side]:
+    def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""
         a, b = solids[owner], solids[other]
         assert not isinstance(a, Ground)
         assert not isinstance(b, Ground)
-        theirs = [(k, part) for k, (solid, part) in enumerate(parts) if solid == other]
-        surfaces = [(k, part.shape.surface(rounding(b))) for k, part in theirs]
+        surfaces = [
+            (k, part.shape.surface(rounding(b)))
+            for k, (solid, part) in enumerate(parts)
+            if solid == other
+        ]
         if not surfaces:
             surfaces = [(-1, b.shape.surface(rounding(b)))]
         return [
-            Side(owner, other, some, surface, None, part=k, sharp=sharp)
-            for some, sharp in groups(a)
+            HalfPair(owner, other, samples, surface, None, part=k, face_normals=face_normals)
+            for samples, face_normals in sample_sets(a)
             for k, surface in surfaces
         ]
 
-    # a gripper's servo keeps its fingers apart
-    first_tool = len(scene.bodies)
-    twins = {(first_tool + first, first_tool + first + 1) for first, _ in scene.grippers}
-    for i, a in enumerate(solids[:movers]):
+    first_drive = len(scene.bodies)
+    # the grip servo keeps the two fingers of a gripper apart
+    fingers = {(first_drive + first, first_drive + first + 1) for first, _ in scene.grippers}
+    for i, a in enumerate(solids[:dynamic_count]):
         assert not isinstance(a, Static | Ground)
         for j in range(i + 1, len(solids)):
             b = solids[j]
-            if (i, j) in twins:
+            if (i, j) in fingers:
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
-                for some, sharp in groups(a):
-                    yield Side(i, j, some, plane, None, sharp=sharp)
+                for samples, face_normals in sample_sets(a):
+                    yield HalfPair(i, j, samples, plane, None, face_normals=face_normals)
                 continue
             bodies = isinstance(a, Body) and isinstance(b, Body)
             if fidelity.geometry == "particle" and bodies:
                 pa, pb = particles(a), particles(b)
-                yield Side(i, j, pa, Surface(PARTICLES, (0.0, 0.0, 0.0), pb.radius), pb)
+                yield HalfPair(i, j, pa, Surface(PARTICLES, (0.0, 0.0, 0.0), pb.radius), pb)
                 continue
             if fidelity.geometry == "particle" and isinstance(a, Body):
-                yield from meetings(i, j)  # particles leave no gap for a tool to slip through
-            elif isinstance(_plain(a.shape), Sphere):
-                yield from meetings(i, j)  # the centre of a sphere is exact
-            elif isinstance(_plain(b.shape), Sphere):
-                yield from meetings(j, i)
+                yield from between(i, j)  # particles leave no gap for a drive to slip through
+            elif isinstance(_single(a.shape), Sphere):
+                yield from between(i, j)  # the centre of a sphere is exact
+            elif isinstance(_single(b.shape), Sphere):
+                yield from between(j, i)
             else:
-                for side in (*meetings(i, j), *meetings(j, i)):
-                    yield side._replace(shared=True)
+                for half_pair in (*between(i, j), *between(j, i)):
+                    yield half_pair._replace(both_sampled=True)

@@ -1,8 +1,13 @@
-"""How a body that lies flat on one of its sides shares out the stiffness of a contact."""
+"""Rocking: how a body that lies flat on one of its sides moves on the stiffness of its contacts.
+
+A body on a face has modes besides moving up and down (bobbing): it rocks about the face's axes. A
+rod or plate rocks faster than it bobs, which limits the stiffness that a time step can carry.
+"""
 
 import numpy as np
 
-from physics.scene.shapes import Shape
+from physics.scene.compound import Compound
+from physics.scene.shapes import Box, Shape
 
 Array = np.ndarray
 
@@ -15,8 +20,16 @@ def point_jacobian(arm: Array) -> Array:
     )
 
 
-def landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
-    """Shares [6, 6] of unit stiffness along and across the normal, on each of the six sides."""
+def largest_eigenvalue(inverse_mass: Array, A: Array) -> float:
+    """Largest eigenvalue of M^-1 A, both symmetric and positive semidefinite."""
+    return float(np.linalg.eigvals(inverse_mass @ A).real.max(initial=0.0))
+
+
+def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
+    """Unit stiffness along and across the normal, [6, 6] each, for each of the six sides.
+
+    The samples that touch share the stiffness by their weights.
+    """
     positions, weights, radius = shape.samples(spacing, 0.0)
     radii = np.broadcast_to(radius, len(weights))
     found = []
@@ -26,18 +39,49 @@ def landings(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
         along, across = np.zeros((6, 6)), np.zeros((6, 6))
         for k in np.flatnonzero(lowest):
             jacobian, weight = point_jacobian(positions[k] - radii[k] * normal), weights[k]
-            pressed = jacobian.T @ np.outer(normal, normal) @ jacobian
-            along += weight * pressed
-            across += weight * (jacobian.T @ jacobian - pressed)
+            normal_part = jacobian.T @ np.outer(normal, normal) @ jacobian
+            along += weight * normal_part
+            across += weight * (jacobian.T @ jacobian - normal_part)
         found.append((along, across))
     return found
 
 
-def fastest(shape: Shape, spacing: float) -> tuple[float, float]:
-    """Stiffness by mass of the fastest mode along and across the normal, against mere bobbing."""
+def fastest_modes(shape: Shape, spacing: float) -> tuple[float, float]:
+    """Stiffness per mass of the fastest mode along and across the normal, relative to bobbing."""
     inverse = np.diag([1.0] * 3 + list(1.0 / shape.inertia(1.0)))
     along, across = 1.0, 1.0
-    for n, t in landings(shape, spacing):
-        along = max(along, float(np.linalg.eigvals(inverse @ n).real.max()))
-        across = max(across, float(np.linalg.eigvals(inverse @ t).real.max()))
+    for n, t in face_contacts(shape, spacing):
+        along = max(along, largest_eigenvalue(inverse, n))
+        across = max(across, largest_eigenvalue(inverse, t))
     return along, across
+
+
+def rocking_leverage(shape: Shape) -> float:
+    """Stiffness times the squared height over the face, divided by the stiffness against rocking.
+
+    For a box on its widest face, which is where a body that slides comes to rest; a compound is
+    taken on the side with the least leverage; balls and capsules don't rock.
+    """
+    if isinstance(shape, Compound):
+        return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0))
+    if not isinstance(shape, Box):
+        return 0.0
+    height, *sides = sorted(shape.half_extents)
+    # three quarters of a face's weight lie on the two edges across the motion, one on its middle
+    return sum(height**2 / (0.75 * side**2) for side in sides) / 2.0
+
+
+def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> float:
+    """The least leverage of the six sides that a solid with these samples can lie on."""
+    # m^2, below which the extent of a side is round-off: the solid can't lie on a line
+    found, least = [], (1e-6 * np.abs(positions).max()) ** 2
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for height in (positions[:, axis] + radii, -positions[:, axis] + radii):
+            lowest = height >= height.max() - 1e-6 * np.abs(height).max()
+            fraction = weights[lowest] / weights[lowest].sum()
+            places = positions[lowest][:, others]
+            spread = fraction @ (places - fraction @ places) ** 2
+            if np.all(spread > least):
+                found.append(float(height.max() ** 2 * np.mean(1.0 / spread)))
+    return min(found, default=0.0)

@@ -1,4 +1,14 @@
-"""The constants of a scene at a fidelity: one table per kind of thing, with named columns."""
+"""The constants of a scene at a fidelity: one table per kind of thing, with named columns.
+
+Solids are the dynamic bodies (the scene's bodies, then its drives), then the statics. A pair of
+solids touches through one or two half-pairs: the samples of one solid, the owner, against the
+surface of the other.
+
+Identical worlds share one row per dynamic body and half-pair. With per-world parameters each lane
+group (LANES worlds side by side) has rows of its own, and the columns named in *_PER_WORLD hold one
+value per lane. Kernels read both kinds by `physics.jit.at`, which compiles to nothing where worlds
+are identical.
+"""
 
 from typing import NamedTuple
 
@@ -8,104 +18,71 @@ from physics.jit import LANES
 
 Array = np.ndarray
 
-
-# one row a mover: bodies, then drives. A drive has no inertia: it never turns
-MOVER = np.dtype(
+# one row per dynamic body. A drive never rotates: its inertia is infinite
+DYNAMIC = np.dtype(
     [
         ("turns", "i8"),  # 1 for a body, 0 for a drive
-        ("core_reach", "f8"),  # m, farthest point from the centre that turning moves
+        ("core_reach", "f8"),  # m, largest distance from the centre of a point that rotation moves
         ("inverse_mass", "f8"),  # 1/kg
         ("inertia", "f8", (3,)),  # kg m^2, principal moments; infinite for drives
         ("inverse_inertia", "f8", (3,)),  # 1/(kg m^2); 0 for drives
-        ("weight", "f8", (3,)),  # N; 0 for drives, whose carriage carries them
+        ("weight", "f8", (3,)),  # N; 0 for drives, whose carriage holds them
         ("servo_stiffness", "f8"),  # N/m
         ("servo_damping", "f8"),  # N s/m
         ("force_limit", "f8"),  # N along each axis
-        ("twin", "i8"),  # the other finger of a gripper, or -1
-        ("grip_limit", "f8"),  # N between the two
+        ("gripper_partner", "i8"),  # index of the other finger of a gripper, or -1
+        ("grip_limit", "f8"),  # N between the two fingers
     ],
     align=True,
 )
+DYNAMIC_PER_WORLD = ("core_reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
 
-
-# one row a side: the samples of an owner against the surface of another solid
-SIDE = np.dtype(
+# one row per half-pair
+HALF_PAIR = np.dtype(
     [
         ("owner", "i8"),  # solid that carries the samples
-        ("surface", "i8"),  # solid whose surface they meet
-        ("frame", "i8"),  # row of Work.solid in whose frame that surface lies
+        ("surface", "i8"),  # solid whose surface they are tested against
+        ("frame", "i8"),  # row of Workspace.solid in whose frame that surface is described
         ("kind", "i8"),  # of that surface
-        ("mirror", "i8"),  # the side of the same pair the other way round, or -1
-        ("next", "i8"),  # the next side of the same pair, after the last the first
+        ("reverse", "i8"),  # half-pair of the same pair with the roles exchanged, or -1
+        ("next_in_pair", "i8"),  # next half-pair of the same pair; the last one names the first
         ("first_sample", "i8"),  # into Model.sample
         ("sample_count", "i8"),
-        ("extent", "f8", (3,)),  # m at size 1, of the samples along the axes of the owner's frame
-        ("first_partner", "i8"),  # likewise, the particles of a particle surface
+        ("extent", "f8", (3,)),  # m at size 1, half extents of the samples in the owner's frame
+        ("first_partner", "i8"),  # into Model.sample: the particles of a particle surface
         ("partner_count", "i8"),
-        ("first_slot", "i8"),  # room for candidates
+        ("first_slot", "i8"),  # into State.candidate
         ("slot_count", "i8"),
-        ("sharp", "i8"),  # 1: corners and edges of a box, which faces push out
+        ("face_normals", "i8"),  # 1: samples of a box, which faces push out, see `box_distance`
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
-        ("owner_reach", "f8"),  # m
-        ("surface_reach", "f8"),  # m
-        ("owner_size", "f8"),  # factor of the samples' positions
-        ("surface_size", "f8"),  # likewise of the partners'
-        ("share", "f8"),  # of the pair's load, factor of the samples' weights
+        ("owner_reach", "f8"),  # m, radius of the owner's bounding sphere
+        ("surface_reach", "f8"),  # m, of the surface's
+        ("owner_size", "f8"),  # factor on the samples' positions
+        ("surface_size", "f8"),  # factor on the partners' positions
+        ("load_share", "f8"),  # fraction of the pair's load, factor on the samples' weights
         ("skin", "f8"),  # m
         ("stiffness", "f8"),  # N/m of a whole face
-        ("damping", "f8"),  # the law's coefficient
+        ("damping", "f8"),  # coefficient of the law
         ("restitution", "f8"),
-        ("rest_speed", "f8"),  # m/s, floor of the impact speed
+        ("rest_speed", "f8"),  # m/s, lower bound of the impact speed
         ("pair_mass", "f8"),  # kg, reduced mass
         ("owner_inverse_mass", "f8"),  # 1/kg
         ("surface_inverse_mass", "f8"),  # 1/kg; 0 for statics
         ("surface_centre", "f8", (3,)),  # m, centre of mass of the surface's solid, in its frame
-        ("yielding", "f8", (3,)),  # 1/(kg m^2), how easily that solid turns, where it counts
+        ("surface_inverse_inertia", "f8", (3,)),  # 1/(kg m^2) of that solid, where it matters
         ("shear_stiffness", "f8"),  # N/m
         ("shear_damping", "f8"),  # N s/m
         ("friction", "f8"),
-        ("rolling", "f8"),  # m, of the resistance against it
-        ("spinning", "f8"),  # m, likewise
+        ("rolling", "f8"),  # m, rolling resistance
+        ("spinning", "f8"),  # m, spinning resistance
         ("twist_stiffness", "f8"),  # N m
         ("twist_damping", "f8"),  # N m s
     ],
     align=True,
 )
-
-
-# one row a part of a compound that has a surface of its own
-PART = np.dtype(
-    [
-        ("solid", "i8"),  # that it belongs to
-        ("position", "f8", (3,)),  # m, of its centre in that solid's frame
-        ("rotation", "f8", (9,)),  # matrix, row by row: its own frame to that solid's
-        ("first_cover", "i8"),  # into Model.cover
-        ("cover_count", "i8"),
-    ],
-    align=True,
-)
-
-
-# one row a rectangle of a part's face that another hides, see `seams.Cover`
-COVER = np.dtype(
-    [
-        ("axis", "i8"),
-        ("sign", "f8"),
-        ("face", "f8"),  # m at size 1, as the others
-        ("low", "f8", (2,)),
-        ("high", "f8", (2,)),
-    ],
-    align=True,
-)
-
-
-# what differs where worlds are varied
-MOVER_VARIES = ("core_reach", "inverse_mass", "inertia", "inverse_inertia", "weight")
-
-
-SIDE_VARIES = (
+HALF_PAIR_PER_WORLD = (
     "core",
     "owner_radius",
     "radius",
@@ -113,7 +90,7 @@ SIDE_VARIES = (
     "surface_reach",
     "owner_size",
     "surface_size",
-    "share",
+    "load_share",
     "skin",
     "stiffness",
     "damping",
@@ -123,7 +100,7 @@ SIDE_VARIES = (
     "owner_inverse_mass",
     "surface_inverse_mass",
     "surface_centre",
-    "yielding",
+    "surface_inverse_inertia",
     "shear_stiffness",
     "shear_damping",
     "friction",
@@ -131,26 +108,48 @@ SIDE_VARIES = (
     "twist_damping",
 )
 
+# one row per part of a compound that has a surface of its own
+COMPOUND_PART = np.dtype(
+    [
+        ("solid", "i8"),  # that it belongs to
+        ("position", "f8", (3,)),  # m, of its centre in that solid's frame
+        ("rotation", "f8", (9,)),  # matrix, row by row: the part's frame to that solid's
+        ("first_hidden_face", "i8"),  # into Model.hidden_face
+        ("hidden_face_count", "i8"),
+    ],
+    align=True,
+)
+COMPOUND_PART_PER_WORLD = ("position",)
 
-PART_VARIES = ("position",)
+# one row per rectangle of a part's face that another part hides, see `internal_faces.HiddenFace`
+HIDDEN_FACE = np.dtype(
+    [
+        ("axis", "i8"),
+        ("sign", "f8"),
+        ("face", "f8"),  # m at size 1, as are the ends below
+        ("low", "f8", (2,)),
+        ("high", "f8", (2,)),
+    ],
+    align=True,
+)
 
 
 class Model(NamedTuple):
     """The constants of a scene.
 
     Attributes:
-        mover: [m] of MOVER; of varied worlds [groups, m], with a value a lane of MOVER_VARIES.
-        side: [k] of SIDE; of varied worlds [groups, k], with a value a lane of SIDE_VARIES.
-        part: [q] of PART; of varied worlds [groups, q], with a value a lane of PART_VARIES.
-        cover: [c] of COVER.
-        static: [s, 7] position m and quaternion x y z w of the statics.
+        dynamic: [m] of DYNAMIC; with per-world parameters [groups, m].
+        half_pair: [k] of HALF_PAIR; with per-world parameters [groups, k].
+        compound_part: [q] of COMPOUND_PART; with per-world parameters [groups, q].
+        hidden_face: [c] of HIDDEN_FACE.
+        static: [s, 7] position in m and quaternion x y z w of the statics.
         sample: [4, p] x y z in m in the owner's frame at size 1, and weight.
     """
 
-    mover: Array
-    side: Array
-    part: Array
-    cover: Array
+    dynamic: Array
+    half_pair: Array
+    compound_part: Array
+    hidden_face: Array
     static: Array
     sample: Array
 
@@ -161,25 +160,29 @@ class Model(NamedTuple):
 
     def of_world(self, world: int) -> "Model":
         """The model of one world, by itself."""
-        if self.mover.ndim == 1:
+        if self.dynamic.ndim == 1:
             return self
         group, lane = divmod(world, LANES)
         tables = []
         for table, dtype, fields in (
-            (self.mover, MOVER, MOVER_VARIES),
-            (self.side, SIDE, SIDE_VARIES),
-            (self.part, PART, PART_VARIES),
+            (self.dynamic, DYNAMIC, DYNAMIC_PER_WORLD),
+            (self.half_pair, HALF_PAIR, HALF_PAIR_PER_WORLD),
+            (self.compound_part, COMPOUND_PART, COMPOUND_PART_PER_WORLD),
         ):
             rows = np.zeros(table.shape[1], dtype=dtype)
             for name in dtype.names or ():
                 values = table[name][group]
                 rows[name] = values[..., lane] if name in fields else values
             tables.append(rows)
-        return self._replace(mover=tables[0], side=tables[1], part=tables[2])
+        return self._replace(dynamic=tables[0], half_pair=tables[1], compound_part=tables[2])
 
     def of_group(self, group: int) -> "Model":
-        """The model of one group of worlds, as the kernels take it."""
-        if self.mover.ndim == 1:
+        """The model of one lane group, as the kernels take it."""
+        if self.dynamic.ndim == 1:
             return self
         alone = slice(group, group + 1)
-        return self._replace(mover=self.mover[alone], side=self.side[alone], part=self.part[alone])
+        return self._replace(
+            dynamic=self.dynamic[alone],
+            half_pair=self.half_pair[alone],
+            compound_part=self.compound_part[alone],
+        )

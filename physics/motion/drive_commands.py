@@ -1,5 +1,6 @@
-"""What drives are told: written into the state of all worlds, for the steps that follow."""
+"""Commands to drives: how the set points of their servos move in the steps that follow."""
 
+import math
 from functools import cache
 from typing import Any
 
@@ -10,42 +11,45 @@ from physics.jit import SOURCES, entry
 Array = np.ndarray
 
 
-def by_worlds(values: Array) -> Array:
-    """Values [count, tools, 3] as an array [tools, 3, count]: a copy unless they lie so already."""
+def worlds_last(values: Array) -> Array:
+    """Values [count, drives, 3] as an array [drives, 3, count]; copied only if needed."""
     return np.ascontiguousarray(values.transpose(1, 2, 0))
 
 
 @cache
-def make_command() -> Any:
-    """Entry point that lets every tool's reference move from where the tool is, at a velocity."""
+def make_velocity_command() -> Any:
+    """Entry point: every set point starts at its drive's position and moves at a velocity."""
     sources = SOURCES
+    for_ever = math.inf
 
     @entry
-    def command(mover, bodies, velocity):
+    def command(dynamic, bodies, velocity):
         _ = sources
         for w in range(velocity.shape[2]):
             for d in range(velocity.shape[0]):
-                tool = mover[w, bodies + d]
+                drive = dynamic[w, bodies + d]
+                drive.reference_time = for_ever
                 for c in range(3):
-                    tool.reference[c] = tool.position[c]
-                    tool.reference_velocity[c] = velocity[d, c, w]
+                    drive.reference[c] = drive.position[c]
+                    drive.reference_velocity[c] = velocity[d, c, w]
 
     return command
 
 
 @cache
-def make_lead() -> Any:
-    """Entry point that lets every tool's reference move from where it is, to a target in `time`."""
+def make_move_command() -> Any:
+    """Entry point: every set point moves from where it is to a target in `time` s and stops."""
     sources = SOURCES
 
     @entry
-    def lead(mover, bodies, target, time):
+    def move(dynamic, bodies, target, time):
         _ = sources
         for w in range(target.shape[2]):
             for d in range(target.shape[0]):
-                tool = mover[w, bodies + d]
+                drive = dynamic[w, bodies + d]
+                drive.reference_time = time
                 for c in range(3):
-                    way = target[d, c, w] - tool.reference[c]
-                    tool.reference_velocity[c] = way / time
+                    distance = target[d, c, w] - drive.reference[c]
+                    drive.reference_velocity[c] = distance / time
 
-    return lead
+    return move

@@ -1,9 +1,10 @@
-"""Servos of driven tools: a spring and damper to a moving reference, their force limited.
+"""Servos of drives: a spring and damper between the drive and a moving set point, force-limited.
 
-A gripper is one mechanism. Along y, where it closes, the servos' forces on its two fingers are the
-carriage's, the same on both, and the grip's, opposite on both. Each is limited by itself; fingers
-limited one by one would have nothing to centre them once both are at their limit. Along x and z
-the fingers are one solid: whatever acts on either acts on both, half and half.
+A gripper is one mechanism. Along y, the axis along which it closes, the servo forces on its two
+fingers are the carriage's (the same on both) plus the grip's (opposite on both), and each is
+limited separately. Fingers with independent limits would have no restoring force towards the middle
+once both are saturated. Along x and z the fingers move as one solid: forces on either act on both,
+half each.
 """
 
 from functools import cache
@@ -12,52 +13,63 @@ from physics.jit import LANES, stage
 
 CLOSING = 1  # axis along which grippers close
 
+# fraction of a substep by which the end of a set point's motion may miss the end of a substep:
+# frames are cut into substeps up to round-off
+_SAME_STEP = 1e-9
+
 
 @cache
 def make_drives(features):
-    """Stage that moves the references on and adds the servos' forces."""
+    """Stage that moves the set points and adds the servo forces."""
     present, gripper = features.drives, features.gripper
 
     @stage
-    def drives(model, work, h):
+    def drives(model, workspace, h):
         if present:
-            for m in range(model.mover.shape[0]):
-                if model.mover[m].turns:
+            for m in range(model.dynamic.shape[0]):
+                if model.dynamic[m].turns:
                     continue
-                solid, constants = work.solid[m], model.mover[m]
-                c, v, force = solid.position, solid.velocity, solid.force
-                reference, wanted = solid.reference, solid.reference_velocity
+                solid, constants = workspace.solid[m], model.dynamic[m]
                 stiffness, damping = constants.servo_stiffness, constants.servo_damping
-                limit, twin = constants.force_limit, constants.twin
+                limit, partner = constants.force_limit, constants.gripper_partner
+                c, v, force = solid.position, solid.velocity, solid.force
+                reference, velocity = solid.reference, solid.reference_velocity
+                left = solid.reference_time
                 for axis in range(3):
-                    grips = gripper and twin >= 0 and axis == CLOSING
+                    grips = gripper and partner >= 0 and axis == CLOSING
                     most = 1e300 if grips else limit
                     for i in range(LANES):
-                        ahead = reference[axis, i] + h * wanted[axis, i]
+                        # fraction of the substep for which the set point still moves
+                        whole = left[i] > (1.0 - _SAME_STEP) * h
+                        moving = 1.0 if whole else max(left[i], 0.0) / max(h, 1e-300)
+                        ahead = reference[axis, i] + h * (moving * velocity[axis, i])
                         reference[axis, i] = ahead
                         pull = stiffness * (ahead - c[axis, i])
-                        pull += damping * (wanted[axis, i] - v[axis, i])
+                        pull += damping * (moving * velocity[axis, i] - v[axis, i])
                         force[axis, i] += min(max(pull, -most), most)
-                if gripper and twin >= 0 and twin < m:
-                    limit_forces(work.solid[twin].force, force, limit, constants.grip_limit)
+                for i in range(LANES):
+                    left[i] = max(left[i] - h, 0.0)
+                if gripper and partner >= 0 and partner < m:
+                    other = workspace.solid[partner].force
+                    limit_forces(other, force, limit, constants.grip_limit)
 
     return drives
 
 
 @stage
 def limit_forces(force, other, limit, grip_limit):
-    """Limits what the servos, so far alone, give a gripper's two fingers along y."""
+    """Limits the servo forces on a gripper's two fingers along y; no other force is in them yet."""
     for i in range(LANES):
         one, two = force[CLOSING, i], other[CLOSING, i]
-        carried = min(max(0.5 * (one + two), -limit), limit)
-        gripped = min(max(0.5 * (one - two), -grip_limit), grip_limit)
-        force[CLOSING, i] = carried + gripped
-        other[CLOSING, i] = carried - gripped
+        carriage = min(max(0.5 * (one + two), -limit), limit)
+        grip = min(max(0.5 * (one - two), -grip_limit), grip_limit)
+        force[CLOSING, i] = carriage + grip
+        other[CLOSING, i] = carriage - grip
 
 
 @stage
-def share(values, others):
-    """Gives both fingers the mean of what they have, but along the closing axis."""
+def average(values, others):
+    """Replaces two fingers' vectors by their mean, except along the closing axis."""
     for axis in range(3):
         if axis != CLOSING:
             for i in range(LANES):
@@ -67,34 +79,35 @@ def share(values, others):
 
 
 @cache
-def make_join(features):
-    """Stage that makes one solid of the fingers: of forces, and of collisions' momenta if any."""
+def make_finger_coupling(features):
+    """Stage that makes one solid of a gripper's fingers: forces, and momenta after collisions."""
     gripper = features.gripper
 
     @stage
-    def join(model, work, drifted):
+    def couple_fingers(model, workspace, drifted):
         if gripper:
-            for m in range(model.mover.shape[0]):
-                twin = model.mover[m].twin
-                if twin > m:
-                    share(work.solid[m].force, work.solid[twin].force)
+            for m in range(model.dynamic.shape[0]):
+                partner = model.dynamic[m].gripper_partner
+                if partner > m:
+                    one, other = workspace.solid[m], workspace.solid[partner]
+                    average(one.force, other.force)
                     if drifted > 0.0:
-                        share(work.solid[m].momentum, work.solid[twin].momentum)
+                        average(one.momentum, other.momentum)
 
-    return join
+    return couple_fingers
 
 
 @cache
-def make_join_speeds(features):
-    """Stage that makes one solid of the fingers while impulses change their speeds."""
+def make_finger_velocity_coupling(features):
+    """Stage that makes one solid of a gripper's fingers while impulses change their velocities."""
     gripper = features.gripper
 
     @stage
-    def join_speeds(model, work):
+    def couple_finger_velocities(model, workspace):
         if gripper:
-            for m in range(model.mover.shape[0]):
-                twin = model.mover[m].twin
-                if twin > m:
-                    share(work.solid[m].velocity, work.solid[twin].velocity)
+            for m in range(model.dynamic.shape[0]):
+                partner = model.dynamic[m].gripper_partner
+                if partner > m:
+                    average(workspace.solid[m].velocity, workspace.solid[partner].velocity)
 
-    return join_speeds
+    return couple_finger_velocities

@@ -1,13 +1,14 @@
-"""Gravity: a uniform field makes no torque. It comes first and so clears the last step's sums."""
+"""Gravity: a uniform field exerts no torque. It comes first and so clears the last step's sums."""
 
 from physics.jit import LANES, at, stage
 
 
 @stage
-def gravity(model, work):
-    """Sets every mover's force to its weight and its torque to zero."""
-    for m in range(model.mover.shape[0]):
-        force, torque, weight = work.solid[m].force, work.solid[m].torque, model.mover[m].weight
+def gravity(model, workspace):
+    """Sets the force on every dynamic body to its weight and the torque to zero."""
+    for m in range(model.dynamic.shape[0]):
+        weight, solid = model.dynamic[m].weight, workspace.solid[m]
+        force, torque = solid.force, solid.torque
         wx, wy, wz = weight[0], weight[1], weight[2]
         for i in range(LANES):
             force[0, i] = at(wx, i)

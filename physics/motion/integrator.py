@@ -1,14 +1,13 @@
 """Kick-drift-kick for translation, the midpoint rule for rotation: second order.
 
-The state is (c, q, P, L). A substep is half a kick, a drift, new forces, half a kick. Forces that
-depend on velocity see the half-step velocity of the drift. Without torque L is constant to the last
-bit, and omega = J^-1 L is not: the midpoint rule turns by omega at the orientation half a step
-ahead.
+The state is (c, q, P, L): position, quaternion, momentum, angular momentum. A substep is half a
+kick, a drift, new forces, half a kick. Forces that depend on velocity see the half-step velocity of
+the drift. Without torque L stays bitwise constant while omega = J^-1 L does not: the midpoint rule
+rotates by the omega that belongs to the orientation half a step ahead.
 
-The midpoint rule loses track of the energy where L would turn the body far about its slimmest
-axis: a rod of 5 by 6 by 40 mm that tumbled at 0.26 rad a substep, its L good for 5.7 rad about its
-length, had after 0.4 s all the energy that its L allows, 26 times its own, and thin solids seemed
-to gain theirs in collisions. So such a turn is made in parts, each within SMALL_TURN up to 30 rad.
+The midpoint rule does not conserve energy where L would rotate the body by a large angle about its
+slimmest axis. Such a rotation is made in parts, each within SMALL_ROTATION up to 30 rad per step
+(evidence: docs/decisions).
 """
 
 import math
@@ -16,33 +15,29 @@ from functools import cache
 
 from physics.jit import LANES, at, stage
 from physics.model.features import GENERAL, NO_ROTATION
-from physics.motion.kinematics import spin_of
-from physics.rotation import SMALL_TURN, turn, turn_far
+from physics.motion.kinematics import angular_velocity_of
+from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far
 
-# beyond 30 rad a substep parts are longer than SMALL_TURN
+# parts of one rotation at most: beyond 30 rad per substep they are longer than SMALL_ROTATION
 MOST_PARTS = 100.0
 
 
 @cache
 def make_kick(features):
-    """Stage that adds the impulse of the present force over a time."""
+    """Stage that adds the impulses of the present force and torque over a time."""
     rotation = features.rotation
 
     @stage
-    def kick(model, work, time):
-        for m in range(model.mover.shape[0]):
-            solid = work.solid[m]
-            P, force, L, torque = (
-                solid.momentum,
-                solid.force,
-                solid.angular_momentum,
-                solid.torque,
-            )
+    def kick(model, workspace, time):
+        for m in range(model.dynamic.shape[0]):
+            solid = workspace.solid[m]
+            P, L = solid.momentum, solid.angular_momentum
+            force, torque = solid.force, solid.torque
             for i in range(LANES):
                 P[0, i] += time * force[0, i]
                 P[1, i] += time * force[1, i]
                 P[2, i] += time * force[2, i]
-            if rotation != NO_ROTATION and model.mover[m].turns:
+            if rotation != NO_ROTATION and model.dynamic[m].turns:
                 for i in range(LANES):
                     L[0, i] += time * torque[0, i]
                     L[1, i] += time * torque[1, i]
@@ -52,98 +47,98 @@ def make_kick(features):
 
 
 @cache
-def make_turning(features, turn):
-    """Formula that turns a quaternion by the midpoint rule, and tells omega."""
+def make_midpoint_rotation(features, rotate_quaternion):
+    """Formula of the midpoint rule: returns the new quaternion and the omega it used."""
     rotation = features.rotation
 
     @stage
-    def turning(x, y, z, w, jx, jy, jz, lx, ly, lz, time):
+    def midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, time):
         if rotation == GENERAL:
             half = 0.5 * time
-            ox, oy, oz = spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
-            hx, hy, hz, hw = turn(x, y, z, w, half * ox, half * oy, half * oz)
-            ox, oy, oz = spin_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
+            ox, oy, oz = angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
+            hx, hy, hz, hw = rotate_quaternion(x, y, z, w, half * ox, half * oy, half * oz)
+            ox, oy, oz = angular_velocity_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
         else:
             ox, oy, oz = jx * lx, jx * ly, jx * lz
-        x, y, z, w = turn(x, y, z, w, time * ox, time * oy, time * oz)
+        x, y, z, w = rotate_quaternion(x, y, z, w, time * ox, time * oy, time * oz)
         return x, y, z, w, ox, oy, oz
 
-    return turning
+    return midpoint_rotation
 
 
 @stage
-def longest(jx, jy, jz, time):
-    """Square of the angular momentum up to which a turn counts as small."""
-    fastest = time * max(jx, jy, jz)
-    return SMALL_TURN * SMALL_TURN / (fastest * fastest)
+def small_rotation_limit(jx, jy, jz, time):
+    """Square of the angular momentum up to which a rotation counts as small."""
+    most = time * max(jx, jy, jz)
+    return SMALL_ROTATION * SMALL_ROTATION / (most * most)
 
 
 @cache
 def make_drift(features):
-    """Stage that moves and turns every mover for a time, and tells how far its surface may go."""
+    """Stage that moves and rotates every dynamic body for a time, and bounds how far it moved."""
     rotation = features.rotation
-    turning, turning_far = make_turning(features, turn), make_turning(features, turn_far)
+    midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
+    midpoint_rotation_far = make_midpoint_rotation(features, rotate_quaternion_far)
 
     @stage
-    def drift(model, work, time):
-        for m in range(model.mover.shape[0]):
-            solid, constants = work.solid[m], model.mover[m]
+    def drift(model, workspace, time):
+        for m in range(model.dynamic.shape[0]):
+            solid, constants = workspace.solid[m], model.dynamic[m]
             c, q, P, L = solid.position, solid.orientation, solid.momentum, solid.angular_momentum
-            shift, swing = solid.shift, solid.swing
-            inverse_mass, reaches, j = (
-                constants.inverse_mass,
-                constants.core_reach,
-                constants.inverse_inertia,
-            )
+            displacement, rotation_bound = solid.displacement, solid.rotation_bound
+            inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
+            reaches = constants.core_reach
             for i in range(LANES):
                 step = time * at(inverse_mass, i)
                 dx, dy, dz = step * P[0, i], step * P[1, i], step * P[2, i]
                 c[0, i] += dx
                 c[1, i] += dy
                 c[2, i] += dz
-                shift[0, i] = dx
-                shift[1, i] = dy
-                shift[2, i] = dz
+                displacement[0, i] = dx
+                displacement[1, i] = dy
+                displacement[2, i] = dz
             if rotation == NO_ROTATION or not constants.turns:
                 continue
             far = 0
             for i in range(LANES):
                 jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                square, reach = longest(jx, jy, jz, time), time * at(reaches, i)
+                square, reach = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
                 x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
-                nx, ny, nz, nw, ox, oy, oz = turning(x, y, z, w, jx, jy, jz, lx, ly, lz, time)
-                near = lx * lx + ly * ly + lz * lz <= square
-                q[0, i] = nx if near else x
-                q[1, i] = ny if near else y
-                q[2, i] = nz if near else z
-                q[3, i] = nw if near else w
-                # the sum of absolute values is never less than the length, and needs no root
-                swing[i] = reach * (abs(ox) + abs(oy) + abs(oz)) if near else math.inf
-                far += 0 if near else 1
+                nx, ny, nz, nw, ox, oy, oz = midpoint_rotation(
+                    x, y, z, w, jx, jy, jz, lx, ly, lz, time
+                )
+                small = lx * lx + ly * ly + lz * lz <= square
+                q[0, i] = nx if small else x
+                q[1, i] = ny if small else y
+                q[2, i] = nz if small else z
+                q[3, i] = nw if small else w
+                # the sum of absolute values is an upper bound of the length, and needs no root
+                rotation_bound[i] = reach * (abs(ox) + abs(oy) + abs(oz)) if small else math.inf
+                far += 0 if small else 1
             if far > 0:
                 for i in range(LANES):
                     jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                    square, reach = longest(jx, jy, jz, time), time * at(reaches, i)
+                    square, reach = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
                     lx, ly, lz = L[0, i], L[1, i], L[2, i]
-                    if swing[i] == math.inf:
+                    if rotation_bound[i] == math.inf:
                         far_by = math.sqrt((lx * lx + ly * ly + lz * lz) / square)
                         parts = 1
-                        # what has no slim axis turns exactly in one, and NaN is no number of parts
+                        # equal moments need one part; a comparison with NaN is false
                         if rotation == GENERAL and far_by > 1.0 and not jx == jy == jz:
                             parts = math.ceil(min(MOST_PARTS, far_by))
                         x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                         fastest = 0.0
                         for _ in range(parts):
-                            x, y, z, w, ox, oy, oz = turning_far(
+                            x, y, z, w, ox, oy, oz = midpoint_rotation_far(
                                 x, y, z, w, jx, jy, jz, lx, ly, lz, time / parts
                             )
-                            spin = abs(ox) + abs(oy) + abs(oz)
-                            fastest = fastest if spin <= fastest else spin  # NaN stays
+                            speed = abs(ox) + abs(oy) + abs(oz)
+                            fastest = fastest if speed <= fastest else speed  # keeps NaN
                         q[0, i] = x
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        swing[i] = reach * fastest
+                        rotation_bound[i] = reach * fastest
 
     return drift

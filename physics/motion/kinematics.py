@@ -8,7 +8,7 @@ from physics.rotation import rotation_entries
 
 
 @stage
-def place(solid, i):
+def write_rotation(solid, i):
     """Writes the rotation matrix of a solid in lane i from its quaternion."""
     q, R = solid.orientation, solid.rotation
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(
@@ -26,37 +26,37 @@ def place(solid, i):
 
 
 @stage
-def place_statics(model, work):
+def write_static_frames(model, workspace):
     """Writes the rows of the statics, once for all worlds and steps."""
-    movers = model.mover.shape[0]
+    dynamic_count = model.dynamic.shape[0]
     for s in range(model.static.shape[0]):
-        solid = work.solid[movers + s]
+        solid = workspace.solid[dynamic_count + s]
         for i in range(LANES):
             for c in range(3):
                 solid.position[c, i] = model.static[s, c]
                 solid.velocity[c, i] = 0.0
-                solid.spin[c, i] = 0.0
-                solid.shift[c, i] = 0.0
+                solid.angular_velocity[c, i] = 0.0
+                solid.displacement[c, i] = 0.0
             for c in range(4):
                 solid.orientation[c, i] = model.static[s, 3 + c]
-            solid.swing[i] = 0.0
-            place(solid, i)
+            solid.rotation_bound[i] = 0.0
+            write_rotation(solid, i)
 
 
 @stage
-def place_tools(model, work):
-    """Writes what never changes of the tools, once for all steps: they may stand askew."""
-    for m in range(model.mover.shape[0]):
-        if not model.mover[m].turns:
-            solid = work.solid[m]
+def write_drive_frames(model, workspace):
+    """Writes what never changes of the drives, once for all steps: they never rotate."""
+    for m in range(model.dynamic.shape[0]):
+        if not model.dynamic[m].turns:
+            solid = workspace.solid[m]
             for i in range(LANES):
                 for c in range(3):
-                    solid.spin[c, i] = 0.0
-                place(solid, i)
+                    solid.angular_velocity[c, i] = 0.0
+                write_rotation(solid, i)
 
 
 @stage
-def spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
+def angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
     """Omega = R J0^-1 R^T L of a body with quaternion x y z w; jx, jy, jz are 1/moments."""
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_entries(x, y, z, w)
     bx = jx * (r00 * lx + r10 * ly + r20 * lz)
@@ -71,31 +71,33 @@ def spin_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
 
 @cache
 def make_kinematics(features):
-    """Stage that brings the frames of the movers up to their state."""
+    """Stage that updates the frames of the dynamic bodies from their state."""
     rotation = features.rotation
 
     @stage
-    def kinematics(model, work):
-        for m in range(model.mover.shape[0]):
-            solid, constants = work.solid[m], model.mover[m]
+    def kinematics(model, workspace):
+        for m in range(model.dynamic.shape[0]):
+            solid, constants = workspace.solid[m], model.dynamic[m]
             q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
-            v, omega = solid.velocity, solid.spin
+            v, omega = solid.velocity, solid.angular_velocity
             inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
             for i in range(LANES):
                 v[0, i] = at(inverse_mass, i) * P[0, i]
                 v[1, i] = at(inverse_mass, i) * P[1, i]
                 v[2, i] = at(inverse_mass, i) * P[2, i]
-            if not constants.turns:  # see place_tools
+            if not constants.turns:  # see write_drive_frames
                 continue
             for i in range(LANES):
-                place(solid, i)
+                write_rotation(solid, i)
             for i in range(LANES):
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
                 jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
                 if rotation == NO_ROTATION:
                     ox, oy, oz = 0.0, 0.0, 0.0
                 elif rotation == GENERAL:
-                    ox, oy, oz = spin_of(q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz)
+                    ox, oy, oz = angular_velocity_of(
+                        q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz
+                    )
                 else:
                     ox, oy, oz = jx * lx, jx * ly, jx * lz
                 omega[0, i] = ox

@@ -1,11 +1,17 @@
-"""Products of vectors and matrices whose entries stand in lanes."""
+"""Products of 3-vectors, rotation matrices and symmetric tensors whose entries stand in lanes."""
 
 from physics.jit import stage
 
 
 @stage
-def turned(R, i, x, y, z):
-    """A vector of the frame R of lane i in the world frame."""
+def cross(ax, ay, az, bx, by, bz):
+    """The cross product a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@stage
+def rotated(R, i, x, y, z):
+    """R v: a vector of the frame R (rows in [9, LANES]) in the frame that R rotates into."""
     return (
         R[0, i] * x + R[1, i] * y + R[2, i] * z,
         R[3, i] * x + R[4, i] * y + R[5, i] * z,
@@ -14,8 +20,8 @@ def turned(R, i, x, y, z):
 
 
 @stage
-def turned_back(R, i, x, y, z):
-    """A vector of the world frame in the frame R of lane i."""
+def rotated_back(R, i, x, y, z):
+    """R^T v: the inverse of `rotated`."""
     return (
         R[0, i] * x + R[3, i] * y + R[6, i] * z,
         R[1, i] * x + R[4, i] * y + R[7, i] * z,
@@ -24,16 +30,10 @@ def turned_back(R, i, x, y, z):
 
 
 @stage
-def times(entry, i, x, y, z):
-    """A symmetric tensor times a vector, in lane i."""
+def tensor_times(entry, i, x, y, z):
+    """A symmetric tensor (xx yy zz xy xz yz in [6, LANES]) times a vector."""
     return (
         entry[0, i] * x + entry[3, i] * y + entry[4, i] * z,
         entry[3, i] * x + entry[1, i] * y + entry[5, i] * z,
         entry[4, i] * x + entry[5, i] * y + entry[2, i] * z,
     )
-
-
-@stage
-def cross(ax, ay, az, bx, by, bz):
-    """The vector product."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

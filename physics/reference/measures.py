@@ -20,8 +20,10 @@ from physics.reference.scenes import (
     tower,
 )
 from physics.scene.fidelity import Fidelity
-from physics.scene.scene import Body, Ground, Material, Scene
+from physics.scene.material import Material
+from physics.scene.scene import Scene
 from physics.scene.shapes import Shape
+from physics.scene.solids import Body, Ground
 from physics.world import World
 
 Array = np.ndarray

@@ -10,9 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
-from physics.scene.scene import Body, Drive, Ground, Material, Scene, Vector
+from physics.scene.material import Material
+from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Capsule, Shape, Sphere
+from physics.scene.solids import Body, Ground
+from physics.scene.validation import Vector
 from physics.world import World
 
 GRAVITY = 9.81  # m/s^2

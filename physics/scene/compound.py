@@ -48,11 +48,11 @@ def _directions(count: int) -> Array:
 _DIRECTIONS = _directions(200)
 
 
-class Group(NamedTuple):
-    """Samples of one radius, and whether they are `sharp`: a box's corners and edges."""
+class SampleSet(NamedTuple):
+    """Samples of one radius, and whether they are those of a box, see `box_distance`."""
 
     samples: Samples
-    sharp: bool
+    face_normals: bool
 
 
 @dataclass(frozen=True)
@@ -157,18 +157,18 @@ class Compound:
         )
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """All of `groups` as one; their radii [n] where they differ."""
-        groups = [group.samples for group in self.groups(spacing, rounding)]
-        if len(groups) == 1:
-            return groups[0]
-        radii = [np.full(len(group.weights), group.radius) for group in groups]
+        """All `sample_sets` as one; their radii [n] where they differ."""
+        sets = [one.samples for one in self.sample_sets(spacing, rounding)]
+        if len(sets) == 1:
+            return sets[0]
+        radii = [np.full(len(one.weights), one.radius) for one in sets]
         return Samples(
-            np.concatenate([group.positions for group in groups]),
-            np.concatenate([group.weights for group in groups]),
+            np.concatenate([one.positions for one in sets]),
+            np.concatenate([one.weights for one in sets]),
             np.concatenate(radii),
         )
 
-    def groups(self, spacing: float, rounding: float) -> tuple[Group, ...]:
+    def sample_sets(self, spacing: float, rounding: float) -> tuple[SampleSet, ...]:
         """Core samples of the parts, but those that others cover, by their radius.
 
         Args:
@@ -176,7 +176,7 @@ class Compound:
             rounding: m by which boxes are inset.
         """
         if self.only is not None:
-            return (Group(self.only.samples(spacing, rounding), isinstance(self.only, Box)),)
+            return (SampleSet(self.only.samples(spacing, rounding), isinstance(self.only, Box)),)
         same = _SAME * self.width
         groups: dict[tuple[Any, bool], list[Array]] = {}
         for i, part in enumerate(self._parts):
@@ -186,18 +186,18 @@ class Compound:
             weights = part.shape.volume / self.volume * inset.weights
             rows = np.column_stack([part.outward(inset.positions), weights, edges])
             kept = rows[self._useful(i, edges, outer.radius)]
-            sharp = isinstance(part.shape, Box)
-            groups.setdefault((inset.radius, sharp), []).append(kept)
+            face_normals = isinstance(part.shape, Box)
+            groups.setdefault((inset.radius, face_normals), []).append(kept)
         found = []
-        for (radius, sharp), blocks in groups.items():
+        for (radius, face_normals), blocks in groups.items():
             rows = np.concatenate(blocks)
             if len(rows):
                 rows = _joined(rows, same)
-                found.append(Group(Samples(rows[:, :3], rows[:, 3], radius), sharp))
+                found.append(SampleSet(Samples(rows[:, :3], rows[:, 3], radius), face_normals))
         heaviest = _heaviest_side([group.samples for group in found], same)
         return tuple(
-            Group(samples._replace(weights=samples.weights / heaviest), sharp)
-            for samples, sharp in found
+            SampleSet(samples._replace(weights=samples.weights / heaviest), face_normals)
+            for samples, face_normals in found
         )
 
     def _useful(self, i: int, points: Array, radius: float | Array) -> Array:
@@ -270,11 +270,11 @@ def _joined(rows: Array, same: float) -> Array:
     return np.array([rows[first == k].mean(axis=0) for k in np.unique(first)])
 
 
-def _heaviest_side(groups: list[Samples], same: float) -> float:
+def _heaviest_side(sets: list[Samples], same: float) -> float:
     """Largest sum of weights that lie lowest, of the six sides along the axes."""
-    positions = np.concatenate([group.positions for group in groups])
-    weights = np.concatenate([group.weights for group in groups])
-    radii = np.concatenate([np.full(len(group.weights), group.radius) for group in groups])
+    positions = np.concatenate([one.positions for one in sets])
+    weights = np.concatenate([one.weights for one in sets])
+    radii = np.concatenate([np.full(len(one.weights), one.radius) for one in sets])
     sums = []
     for normal in (*np.eye(3), *-np.eye(3)):
         height = positions @ normal - radii

@@ -6,7 +6,7 @@ from physics.scene.validation import choice, integer, number, positive
 
 LAWS = ("spring", "impulse")
 GEOMETRIES = ("shape", "particle")
-DAMPINGS = ("overlap", "dashpot")
+DAMPINGS = ("hunt_crossley", "dashpot")
 FRICTIONS = ("coulomb", "viscous")
 
 
@@ -39,7 +39,7 @@ class Fidelity:
 
     law: str = "spring"
     geometry: str = "shape"
-    damping: str = "overlap"
+    damping: str = "hunt_crossley"
     friction: str = "coulomb"
     substep: float = 2e-3
     collision_substeps: int = 5
@@ -54,7 +54,7 @@ class Fidelity:
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
         choice("Fidelity.damping", self.damping, DAMPINGS)
         choice("Fidelity.friction", self.friction, FRICTIONS)
-        for name, only in (("damping", "overlap"), ("friction", "coulomb")):
+        for name, only in (("damping", "hunt_crossley"), ("friction", "coulomb")):
             if self.law == "impulse" and getattr(self, name) != only:
                 raise ValueError(
                     f"Fidelity.{name} {getattr(self, name)!r} belongs to law='spring'; with "

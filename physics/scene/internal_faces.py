@@ -25,7 +25,7 @@ _ASKEW, _SAME = 1e-6, 1e-6
 _ASIDE = 1e-3
 
 
-class Cover(NamedTuple):
+class HiddenFace(NamedTuple):
     """A rectangle of a box's face that another box hides.
 
     Attributes:
@@ -43,16 +43,16 @@ class Cover(NamedTuple):
     high: tuple[float, float]
 
 
-def covers(parts: Sequence[Part]) -> list[list[Cover]]:
+def hidden_faces(parts: Sequence[Part]) -> list[list[HiddenFace]]:
     """What the others hide of each part's faces; only boxes along each other's axes do."""
-    found: list[list[Cover]] = [[] for _ in parts]
+    found: list[list[HiddenFace]] = [[] for _ in parts]
     for i, j in permutations(range(len(parts)), 2):
         width = min(parts[i].shape.width, parts[j].shape.width)
         found[i] += _between(parts[i], parts[j], math.copysign(_ASIDE * width, j - i))
     return found
 
 
-def _between(part: Part, other: Part, aside: float) -> list[Cover]:
+def _between(part: Part, other: Part, aside: float) -> list[HiddenFace]:
     """What another part hides of a part's faces, which count as `aside` m farther out."""
     if not isinstance(part.shape, Box) or not isinstance(other.shape, Box):
         return []
@@ -70,8 +70,8 @@ def _between(part: Part, other: Part, aside: float) -> list[Cover]:
         low = np.where(low < same - half[across], -math.inf, low)
         high = np.where(high > half[across] - same, math.inf, high)
         for sign in (-1.0, 1.0):
-            near, far = sign * middle[axis] - theirs[axis], sign * middle[axis] + theirs[axis]
-            if near < half[axis] + same and far > half[axis] + same:
+            manifold, far = sign * middle[axis] - theirs[axis], sign * middle[axis] + theirs[axis]
+            if manifold < half[axis] + same and far > half[axis] + same:
                 ends = (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
-                found.append(Cover(axis, sign, float(half[axis]) + aside, *ends))
+                found.append(HiddenFace(axis, sign, float(half[axis]) + aside, *ends))
     return found

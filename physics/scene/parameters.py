@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.scene.parameter_ranges import RANGES
 from physics.scene.scene import Scene
 from physics.scene.validation import array, choice
 
@@ -44,15 +45,6 @@ class Parameters(NamedTuple):
         return Parameters(*(values[worlds] for values in self))
 
 
-# name: least value, whether it is itself allowed, largest value
-LIMITS = {
-    "mass": (0.0, False, np.inf),
-    "friction": (0.0, True, np.inf),
-    "restitution": (0.0, True, 1.0),
-    "size": (0.0, False, np.inf),
-}
-
-
 def check_values(given: Mapping[str, Any], worlds: Array, bodies: int) -> dict[str, Array]:
     """Values [n, bodies] of the parameters that are given.
 
@@ -85,7 +77,7 @@ def check_ranges(ranges: Mapping[str, Any], own: Parameters) -> tuple[Parameters
         raise TypeError(f"ranges must be a dict of name: (low, high), got {ranges!r}")
     ends: list[dict[str, Array]] = [{}, {}]
     for name, pair in ranges.items():
-        choice("ranges", name, LIMITS)
+        choice("ranges", name, RANGES)
         if not isinstance(pair, Sequence | np.ndarray) or isinstance(pair, str) or len(pair) != 2:
             raise TypeError(f"ranges[{name!r}] must be two ends (low, high), got {pair!r}")
         for which, end, value in zip(("low", "high"), ends, pair, strict=True):
@@ -104,14 +96,11 @@ def check_ranges(ranges: Mapping[str, Any], own: Parameters) -> tuple[Parameters
 
 def _check_limits(field: str, name: str, values: Array, worlds: Array | None = None) -> None:
     """Refuses values [n, bodies], of the worlds [n] if any, out of a parameter's limits."""
-    least, itself, most = LIMITS[name]
-    wrong = (values > most) | ((values < least) if itself else (values <= least))
+    wrong = RANGES[name].excludes(values)
     if wrong.any():
         row, body = (int(i) for i in np.argwhere(wrong)[0])
-        wanted = f"{'at least' if itself else 'above'} {least:g}"
-        wanted += f" and at most {most:g}" if np.isfinite(most) else ""
         where = f"body {body}" if worlds is None else f"body {body} of world {int(worlds[row])}"
-        raise ValueError(f"{field} must be {wanted}, got {values[row, body]:g} for {where}")
+        raise ValueError(f"{field} must be {RANGES[name]}, got {values[row, body]:g} for {where}")
 
 
 def with_parameters(scene: Scene, p: Parameters) -> Scene:

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 
+Vector = tuple[float, ...]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+IDENTITY: Vector = (0.0, 0.0, 0.0, 1.0)  # the quaternion x y z w of no rotation
+
 
 def number(
     field: str,
@@ -66,7 +71,11 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
 
 
 def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
-    """`value` as a quaternion x, y, z, w of length one; any length but zero is accepted."""
+    """`value` as a quaternion x, y, z, w of length one with w >= 0; q and -q are one rotation.
+
+    Raises:
+        TypeError, ValueError: not four finite numbers; a length of zero.
+    """
     quaternion = vector(field, value, 4)
     length = math.hypot(*quaternion)
     if length < 1e-12:
@@ -74,7 +83,17 @@ def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
             f"{field} must be a quaternion (x, y, z, w) of non-zero length, got {value!r}; "
             "no rotation is (0, 0, 0, 1)"
         )
+    length = math.copysign(length, quaternion[3]) if quaternion[3] != 0.0 else length
     return tuple(x / length for x in quaternion)
+
+
+def text(field: str, value: Any) -> str:
+    """`value` as a text that isn't empty."""
+    if not isinstance(value, str):
+        raise TypeError(f"{field} must be a text, got {value!r} ({type(value).__name__})")
+    if not value.strip():
+        raise ValueError(f"{field} must not be empty, got {value!r}")
+    return value
 
 
 def choice(field: str, value: Any, valid: Iterable[str]) -> str:

@@ -1,16 +1,20 @@
-"""Force that stops a ball from gaining energy where its normal leaps between two faces of a box.
+"""Force that keeps a ball from gaining energy where its normal jumps between two faces of a box.
 
-A kick takes the normal at the present position for the whole step. That errs little while the
-normal turns little. But a ball that sinks so deep that its centre passes close by an edge of the
-box's core, or through it, is pressed by one face in one half of the step and by another in the
-other. With the half step s = h u / 2 of its centre as seen from the box, and overlaps d- d d+ at
-the step's start, middle and end, the spring should do the work k/2 (d-^2 - d+^2), and does, along
-its normal n, k/2 ((d + s.n)^2 - (d - s.n)^2), no overlap counted below 0. (`overlap_force` has the
-same mean over the drift.) On a flat face they are equal. Of what it does too much, a force against
-u takes back, at most until the centre rests. What it does too little is lost: energy only falls by
-what a step doesn't resolve. Capsules meet boxes likewise; boxes meet each other by faces alone.
+A kick uses the normal at the present position for the whole step. The error is small while the
+normal changes little. But a ball may sink so deep that its centre passes close to an edge of the
+box's core, or through it: then one face presses it in one half of the step and another face in the
+other half. With the half step s = h u / 2 of its centre relative to the box, and penetrations
+d- d d+ at the start, middle and end of the step, the spring should do the work
 
-The force acts at the ball's centre, and no report of contacts has it.
+    k/2 (d-^2 - d+^2),    and does, along its normal n,    k/2 ((d + s.n)^2 - (d - s.n)^2),
+
+with no penetration counted below 0 (`hunt_crossley_force` has the same mean over the drift). On a
+flat face the two are equal. Where the kick does too much work, a force against u removes the
+excess, at most until the centre is at rest. Where it does too little, energy is lost: energy can
+only fall by what a step doesn't resolve. The same holds for capsules against boxes; boxes touch
+each other on faces only.
+
+The force acts at the ball's centre, and reports of contacts don't include it.
 """
 
 import math
@@ -18,35 +22,38 @@ from functools import cache
 
 from physics.collision.distances import box_distance
 from physics.jit import LANES, at, kernel, stage
+from physics.model.contact_memory import contact_memory
 
-# half steps of the centre's way within which it is near the core: elsewhere nothing changes
+# half steps of motion within which the centre is near the core; elsewhere nothing changes
 _NEAR = 8.0
 
 
 @stage
-def turned_by(jx, jy, jz, x, y, z, nx, ny, nz):
-    """1/kg that turning adds to a body's inverse mass at p from its centre: (p x n)^2 / J."""
+def rotational_inverse_mass(jx, jy, jz, x, y, z, nx, ny, nz):
+    """1/kg that rotation adds to a body's inverse mass at p from its centre: (p x n)^2 / J."""
     mx, my, mz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
     return jx * mx * mx + jy * my * my + jz * mz * mz
 
 
 @stage
-def _square(overlap):
-    """m^2, of an overlap; 0 if apart."""
-    d = max(overlap, 0.0)
+def _square(penetration):
+    """m^2, of a penetration; 0 if apart."""
+    d = max(penetration, 0.0)
     return d * d
 
 
 @cache
-def make_leaps(compound):
-    """Kernel for the slots of a side that isn't `sharp`, in a scene with compounds or without."""
+def make_energy_correction(features):
+    """Kernel for the slots of a half-pair of balls or capsules against a box."""
+    compound, remembered_face = features.compound, contact_memory(features).face
 
     @kernel
-    def leaps(slots, candidate, seen, constants, h):
-        R, c, v, omega = seen.rotation, seen.position, seen.velocity, seen.spin
-        force, torque = seen.force, seen.torque
+    def correct_energy(slots, candidate, relative, constants, h):
+        R, c = relative.rotation, relative.position
+        v, omega = relative.velocity, relative.angular_velocity
+        force, torque = relative.force, relative.torque
         radii, core, stiffness = constants.radius, constants.core, constants.stiffness
-        pair_mass, yielding = constants.pair_mass, constants.yielding
+        pair_mass, inverse_inertia = constants.pair_mass, constants.surface_inverse_inertia
         centre = constants.surface_centre
         for n in range(slots):
             row = candidate[n]
@@ -60,10 +67,11 @@ def make_leaps(compound):
                 sz = 0.5 * h * (v[2, i] + omega[0, i] * ry - omega[1, i] * rx)
                 px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
-                radius, face, weight = at(radii, i), row.face[i], row.weight[i]
+                radius, face, weight = at(radii, i), row.memory[remembered_face, i], row.weight[i]
                 wx = wy = wz = 0.0
                 if compound:
-                    wx, wy, wz = row.cover[0, i], row.cover[1, i], row.cover[2, i]
+                    hidden = row.hidden_offset
+                    wx, wy, wz = hidden[0, i], hidden[1, i], hidden[2, i]
                 start = box_distance(
                     px - sx, py - sy, pz - sz, ca, cb, cc, face, radius, False, wx, wy, wz
                 )[0]
@@ -81,10 +89,10 @@ def make_leaps(compound):
                 acts = near & (d > 0.0) & (excess > 0.0) & (weight > 0.0)
                 if compound:
                     acts &= max(wx, max(wy, wz)) < math.inf  # hidden by another part
-                turning = turned_by(
-                    at(yielding[0], i),
-                    at(yielding[1], i),
-                    at(yielding[2], i),
+                rotational = rotational_inverse_mass(
+                    at(inverse_inertia[0], i),
+                    at(inverse_inertia[1], i),
+                    at(inverse_inertia[2], i),
                     px - at(centre[0], i),
                     py - at(centre[1], i),
                     pz - at(centre[2], i),
@@ -93,14 +101,13 @@ def make_leaps(compound):
                     sz,
                 )
                 # f |2 s| = k/2 excess, of a force f along s; f h = m |2 s| / h stops the centre
-                inverse_mass = square / at(pair_mass, i) + turning  # times |s|^2
-                taken = min(
-                    0.25 * at(stiffness, i) * excess, 2.0 * square * square / (h * h * inverse_mass)
-                )
-                share = weight * taken / square
-                fx = -share * sx if acts else 0.0
-                fy = -share * sy if acts else 0.0
-                fz = -share * sz if acts else 0.0
+                inverse_mass = square / at(pair_mass, i) + rotational  # times |s|^2
+                stop = 2.0 * square * square / (h * h * inverse_mass)
+                removed = min(0.25 * at(stiffness, i) * excess, stop)
+                factor = weight * removed / square
+                fx = -factor * sx if acts else 0.0
+                fy = -factor * sy if acts else 0.0
+                fz = -factor * sz if acts else 0.0
                 force[0, i] += fx
                 force[1, i] += fy
                 force[2, i] += fz
@@ -108,4 +115,4 @@ def make_leaps(compound):
                 torque[1, i] += rz * fx - rx * fz
                 torque[2, i] += rx * fy - ry * fx
 
-    return leaps
+    return correct_energy

@@ -1,4 +1,4 @@
-"""Poses and velocities of all movers: what tasks look at after every frame."""
+"""Readout: poses and velocities of all dynamic bodies, which tasks read after every frame."""
 
 from functools import cache
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ import numpy as np
 from physics.jit import LANES, SOURCES, at, entry, kernel
 from physics.model.features import GENERAL, NO_ROTATION, Features
 from physics.model.lanes import make_constants
-from physics.motion.kinematics import spin_of
+from physics.motion.kinematics import angular_velocity_of
 
 Array = np.ndarray
 
@@ -16,45 +16,46 @@ WIDTH = 16
 
 
 class Readout(NamedTuple):
-    """The movers' kinematics at one time: bodies, then drives, in scene order; read-only.
+    """Kinematics of all dynamic bodies at one time: bodies, then drives, in scene order; read-only.
 
-    In memory the worlds come last, so that NumPy works on all of them in one stretch.
+    In memory the worlds come last, so NumPy expressions run over all of them in one loop.
 
     Attributes:
-        rows: [count, movers, 16] position m, quaternion x y z w with w >= 0, linear velocity m/s,
-            angular velocity rad/s, in the world frame; and m, where a drive's servo pulls to.
+        rows: [count, dynamic bodies, 16] position in m, quaternion x y z w with w >= 0, linear
+            velocity in m/s and angular velocity in rad/s, in the world frame; set point of a
+            drive's servo in m.
     """
 
     rows: Array
 
     @property
     def position(self) -> Array:
-        """[count, movers, 3] m."""
+        """[count, dynamic bodies, 3] m."""
         return self.rows[..., 0:3]
 
     @property
     def orientation(self) -> Array:
-        """[count, movers, 4] quaternions x y z w, w >= 0."""
+        """[count, dynamic bodies, 4] quaternions x y z w, w >= 0."""
         return self.rows[..., 3:7]
 
     @property
     def linear_velocity(self) -> Array:
-        """[count, movers, 3] m/s."""
+        """[count, dynamic bodies, 3] m/s."""
         return self.rows[..., 7:10]
 
     @property
     def angular_velocity(self) -> Array:
-        """[count, movers, 3] rad/s."""
+        """[count, dynamic bodies, 3] rad/s."""
         return self.rows[..., 10:13]
 
     @property
     def kinematics(self) -> Array:
-        """[count, movers, 13] the four above, side by side."""
+        """[count, dynamic bodies, 13] the four above, side by side."""
         return self.rows[..., :13]
 
     @property
     def reference(self) -> Array:
-        """[count, movers, 3] m, where the servos of drives pull to; of bodies without meaning."""
+        """[count, dynamic bodies, 3] m, set points of servos; for bodies without meaning."""
         return self.rows[..., 13:16]
 
 
@@ -68,18 +69,16 @@ def make_write_rows(features: Features):
         """`model`: of the world's group."""
         lane = w % LANES
         for i in range(table.shape[0]):
-            m, constants = state.mover[w, i], model.mover[i]
+            m, constants = state.dynamic[w, i], model.dynamic[i]
             table[i, 0, w] = m.position[0]
             table[i, 1, w] = m.position[1]
             table[i, 2, w] = m.position[2]
             x, y = m.orientation[0], m.orientation[1]
             z, s = m.orientation[2], m.orientation[3]
-            # q and -q are the same rotation
-            sign = -1.0 if s < 0.0 else 1.0
-            table[i, 3, w] = sign * x
-            table[i, 4, w] = sign * y
-            table[i, 5, w] = sign * z
-            table[i, 6, w] = sign * s
+            table[i, 3, w] = x
+            table[i, 4, w] = y
+            table[i, 5, w] = z
+            table[i, 6, w] = s
             inverse_mass = at(constants.inverse_mass, lane)
             table[i, 7, w] = inverse_mass * m.momentum[0]
             table[i, 8, w] = inverse_mass * m.momentum[1]
@@ -91,7 +90,7 @@ def make_write_rows(features: Features):
                 L, j = m.angular_momentum, constants.inverse_inertia
                 jx, jy, jz = at(j[0], lane), at(j[1], lane), at(j[2], lane)
                 if rotation == GENERAL:
-                    ox, oy, oz = spin_of(x, y, z, s, jx, jy, jz, L[0], L[1], L[2])
+                    ox, oy, oz = angular_velocity_of(x, y, z, s, jx, jy, jz, L[0], L[1], L[2])
                 else:
                     ox, oy, oz = jx * L[0], jx * L[1], jx * L[2]
             table[i, 10, w] = ox
@@ -113,7 +112,7 @@ def make_readout(features: Features) -> Any:
     @entry
     def readout(model, state, table):
         _ = sources
-        for w in range(state.mover.shape[0]):
+        for w in range(state.dynamic.shape[0]):
             write_rows(constants(model, w // LANES), state, w, table)
 
     return readout

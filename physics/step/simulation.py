@@ -6,19 +6,21 @@ from typing import Any
 import numpy as np
 
 from physics.jit import LANES, columns
-from physics.model.build import build, spread, vary
+from physics.model.build import build, expand_per_world, write_per_world
 from physics.model.features import ISOTROPIC, Features
 from physics.model.pairs import Layout
-from physics.model.state import FIRST_TOUCH, MOVING, PRESSED, State, allocate
+from physics.model.state import DYNAMIC_STATE, FIRST_TOUCH, NORMAL_FORCE, State, allocate
 from physics.model.tables import Model
-from physics.model.workspace import Work
+from physics.model.workspace import Workspace
 from physics.rotation import rotate, rotate_back
+from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
-from physics.scene.scene import Body, Drive, Scene
+from physics.scene.scene import Scene
+from physics.scene.solids import Body
 from physics.step.readout import WIDTH, Readout, make_readout
-from physics.step.threads import share_out
-from physics.step.time_layers import cut, make_advance
+from physics.step.threads import run_in_blocks
+from physics.step.time_layers import make_advance, substep_count
 
 Array = np.ndarray
 
@@ -30,35 +32,36 @@ class Simulation:
         scene: what is in each world.
         fidelity: how finely it is simulated.
         count: number of worlds.
-        threads: number of threads that share the worlds.
-        varied: whether worlds have parameters of their own.
+        threads: number of threads.
+        per_world_parameters: whether parameters may differ between worlds.
 
     Attributes:
         base: the model of the scene itself.
-        model: the model that the kernels read; with per-world rows if `varied`.
+        model: the model that the kernels read, with rows for each lane group if
+            `per_world_parameters`.
         features: what is compiled in.
         parameters: [count, bodies] of the bodies; of identical worlds [1, bodies].
         state: what changes.
     """
 
     def __init__(
-        self, scene: Scene, fidelity: Fidelity, count: int, threads: int, varied: bool
+        self, scene: Scene, fidelity: Fidelity, count: int, threads: int, per_world_parameters: bool
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene, self.fidelity, self.count, self.threads = scene, fidelity, count, threads
         self.bodies = len(scene.bodies)
         self.base: Model
         self.features: Features
-        self.base, self.features = build(scene, fidelity, varied)
-        self.model = spread(self.base, count) if varied else self.base
-        self._layout = Layout.of(scene, fidelity) if varied else None
-        self.parameters = Parameters.of(scene, count if varied else 1)
+        self.base, self.features = build(scene, fidelity, per_world_parameters)
+        self.model = expand_per_world(self.base, count) if per_world_parameters else self.base
+        self._layout = Layout.of(scene, fidelity) if per_world_parameters else None
+        self.parameters = Parameters.of(scene, count if per_world_parameters else 1)
         self.state: State = allocate(self.base, self.features, count)
         self.everyone = np.ones(count, dtype=bool)
         self._find_kernels()
-        self._idle: list[Work] = []
-        self._settled = False
-        self._table = columns((len(self.base.mover), WIDTH), count, float)
+        self._idle: list[Workspace] = []
+        self._fresh = False
+        self._table = columns((len(self.base.dynamic), WIDTH), count, float)
         self._table_valid = self._lent = False
         self._span, self._substeps = math.nan, 0
         self.last_substep, self._last_worlds = math.nan, self.everyone  # of the last call; s
@@ -66,104 +69,118 @@ class Simulation:
         self.reset(self.everyone)
 
     def _initial_rows(self) -> Array:
-        """The scene's poses as rows [movers] of MOVING."""
-        movers: list[Body | Drive] = [*self.scene.bodies, *self.scene.tools]
-        rows = np.zeros(len(movers), dtype=MOVING)
-        rows["position"] = rows["reference"] = [m.position for m in movers]
-        rows["orientation"] = [m.orientation for m in movers]
+        """The scene's state as rows [dynamic bodies] of DYNAMIC_STATE."""
+        dynamic_bodies: list[Body | Drive] = [*self.scene.bodies, *self.scene.driven_bodies]
+        rows = np.zeros(len(dynamic_bodies), dtype=DYNAMIC_STATE)
+        rows["position"] = rows["reference"] = [body.position for body in dynamic_bodies]
+        rows["orientation"] = [body.orientation for body in dynamic_bodies]
+        bodies = self.base.dynamic[: self.bodies]
+        rows[: self.bodies] = self._moving(
+            rows[: self.bodies], bodies["inverse_mass"], bodies["inertia"]
+        )
+        return rows
+
+    def _moving(self, rows: Array, inverse_mass: Array, inertia: Array) -> Array:
+        """Rows [..., bodies] of DYNAMIC_STATE with the momenta of the scene's velocities."""
+        bodies = self.scene.bodies
+        velocity = np.array([b.linear_velocity for b in bodies]).reshape(-1, 3)
+        angular_velocity = np.array([b.angular_velocity for b in bodies]).reshape(-1, 3)
+        orientation = np.array([b.orientation for b in bodies]).reshape(-1, 4)
+        rows["momentum"] = velocity / inverse_mass[..., None]
+        rows["angular_momentum"] = angular_momentum_of(inertia, orientation, angular_velocity)
         return rows
 
     def reset(self, worlds: Array) -> None:
         """Puts the worlds of a mask into the scene's state, at time zero."""
-        bodies, mover = self.scene.bodies, self.state.mover
-        mover[worlds] = self._initial
-        velocity = np.array([b.linear_velocity for b in bodies]).reshape(-1, 3)
-        spin = np.array([b.angular_velocity for b in bodies]).reshape(-1, 3)
-        turn = np.array([b.orientation for b in bodies]).reshape(-1, 4)
-        chosen = np.flatnonzero(worlds)
-        inverse, inertia = (self.of_bodies(name, chosen) for name in ("inverse_mass", "inertia"))
-        mover["momentum"][worlds, : self.bodies] = velocity / inverse[..., None]
-        mover["angular_momentum"][worlds, : self.bodies] = spin_momentum(inertia, turn, spin)
+        dynamic = self.state.dynamic
+        dynamic[worlds] = self._initial
+        if self.features.per_world_parameters:  # the same velocities are other momenta
+            chosen = np.flatnonzero(worlds)
+            inverse_mass, inertia = (self.of_bodies(x, chosen) for x in ("inverse_mass", "inertia"))
+            rows = dynamic[worlds, : self.bodies]  # a copy
+            dynamic[worlds, : self.bodies] = self._moving(rows, inverse_mass, inertia)
         self.state.world["time"][worlds] = 0.0
         self.forget(worlds)
 
     def forget(self, worlds: Array) -> None:
-        """Clears what is hidden: candidates, contact memories, forces, divergence."""
+        """Clears the hidden state of worlds: candidates, contact memories, forces, failures."""
         state = self.state
         self.changed()
-        state.world["stale"][worlds] = 1
+        state.world["needs_refresh"][worlds] = 1
         state.world["diverged"][worlds] = 0
         touch = state.touch[..., : self.count]
-        touch[:, PRESSED, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
+        touch[:, NORMAL_FORCE, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
         state.world["overflow"][worlds] = 0
 
     def changed(self, poses: bool = True) -> None:
-        """Notes that the state was written from outside; with `poses`, what `readout` holds too."""
-        self._settled = False
+        """Marks forces as out of date, and the readout if `poses` have changed too."""
+        self._fresh = False
         self._table_valid = self._table_valid and not poses
 
     def advance(self, time: float, worlds: Array) -> bool:
-        """Advances the worlds of a mask by `time` s, in whole substeps; whether all are whole.
+        """Advances the worlds of a mask by `time` s, in whole substeps.
 
-        `failed` says which aren't.
+        Returns whether all went well; `failed` lists the worlds for which it didn't.
         """
-        if time != self._span:  # frames are all of one length
-            self._span, self._substeps = time, cut(time, self.fidelity.substep)
+        if time != self._span:  # most frames have the same length
+            self._span, self._substeps = time, substep_count(time, self.fidelity.substep)
         return self._run(self._span / self._substeps, self._substeps, worlds)
 
     def failed(self, field: str) -> list[int]:
         """Worlds of the last call whose status says "diverged" or "overflow"."""
         return np.flatnonzero((self.state.world[field] != 0) & self._last_worlds).tolist()
 
-    def settle(self) -> bool:
-        """Brings candidates and forces up to a state that was set from outside, for a look at it.
+    def refresh(self) -> bool:
+        """Computes candidates and forces of states that were set from outside, for queries.
 
-        Such worlds stay marked: their first step works the forces out under its own commands, so
-        that looking changes no bit. Returns whether that went well.
+        Such worlds stay marked: their next step computes the forces again, with the commands valid
+        then, so a query changes no bit of the result. Returns whether all went well.
         """
-        if self._settled:
+        if self._fresh:
             return True
-        stale, well = self.state.world["stale"] != 0, True
-        if stale.any():
+        needs_refresh, well = self.state.world["needs_refresh"] != 0, True
+        if needs_refresh.any():
             try:
-                well = self._run(self.fidelity.substep, 0, stale)
+                well = self._run(self.fidelity.substep, 0, needs_refresh)
             finally:
-                self.state.world["stale"][stale] = 1
-        self._settled = well
+                self.state.world["needs_refresh"][needs_refresh] = 1
+        self._fresh = well
         return well
 
     def _run(self, h: float, substeps: int, worlds: Array) -> bool:
-        """Runs the kernel on the worlds of a mask; whether all of them are whole."""
+        """Runs the kernel on the worlds of a mask; returns whether all went well."""
         kernel, everyone = self._advance, bool(worlds.all())
         self.last_substep, self._last_worlds = h, worlds
-        if self._lent:  # who has read the table keeps it
+        if self._lent:  # a reader holds the table
             before = self._table
             self._table, self._lent = np.empty_like(before), False
             if self._table_valid and not everyone:
                 self._table[...] = before
         model, state, table = self.model, self.state, self._table
-        together = self.fidelity.collision_substeps
+        collision_substeps = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
 
         def run(first: int, last: int) -> Any:
             try:
-                work = idle.pop()
-            except IndexError:  # as many as threads are made, once
-                work = Work.of(self.base, self.features)
-            failed = kernel(model, state, work, table, worlds, first, last, h, substeps, together)
-            idle.append(work)
+                workspace = idle.pop()
+            except IndexError:  # happens once per thread
+                workspace = Workspace.of(self.base, self.features)
+            failed = kernel(
+                model, state, workspace, table, worlds, first, last, h, substeps, collision_substeps
+            )
+            idle.append(workspace)
             return failed
 
-        if share_out(run, groups, self.threads) == 0:
-            # a world that diverged before isn't written, nor one that isn't advanced
+        if run_in_blocks(run, groups, self.threads) == 0:
+            # worlds that aren't advanced or that diverged before aren't written
             self._table_valid = self._table_valid or everyone
-            self._settled = self._settled or (everyone and substeps > 0)
+            self._fresh = self._fresh or (everyone and substeps > 0)
             return True
         self._table_valid = False
         return False
 
     def readout(self) -> Readout:
-        """All poses and velocities as they are now, drives after the bodies: read-only."""
+        """All poses and velocities now, drives after the bodies: read-only."""
         if not self._table_valid:
             self._table = np.empty_like(self._table) if self._lent else self._table
             self._readout(self.model, self.state, self._table)
@@ -172,55 +189,62 @@ class Simulation:
         return Readout(read_only(self._table[..., : self.count].transpose(2, 0, 1)))
 
     def of_bodies(self, name: str, worlds: Array | None = None) -> Array:
-        """A field of the model's bodies: [bodies, ...], or [n, bodies, ...] of varied worlds [n].
+        """A column of the model's bodies: [bodies, ...], or [n, bodies, ...] of the worlds [n].
 
-        Both go with an array [n, bodies, ...]. All worlds if None.
+        The latter with per-world parameters; both broadcast with an array [n, bodies, ...]. All
+        worlds if None.
         """
-        rows = self.model.mover[name]
-        if self.model.mover.ndim == 1:
+        rows = self.model.dynamic[name]
+        if self.model.dynamic.ndim == 1:
             return rows[: self.bodies]
         worlds = np.arange(self.count) if worlds is None else worlds
         group, lane = np.divmod(worlds, LANES)
         return rows[group, ..., lane][:, : self.bodies]
 
-    def spin(self, inverse_inertia: Array, orientation: Array, momentum: Array) -> Array:
+    def _angular_velocity_from(
+        self, inverse_inertia: Array, orientation: Array, momentum: Array
+    ) -> Array:
         """Angular velocity [..., 3] of an angular momentum."""
-        if self.features.rotation == ISOTROPIC:  # the same about every axis: no need to turn
+        if self.features.rotation == ISOTROPIC:  # the same about every axis, in any frame
             return np.asarray(inverse_inertia * momentum)
-        turned = inverse_inertia * rotate_back(orientation, momentum)
-        return np.asarray(rotate(orientation, turned))
+        rotated = inverse_inertia * rotate_back(orientation, momentum)
+        return np.asarray(rotate(orientation, rotated))
 
     def angular_velocity(self) -> Array:
         """[count, bodies, 3] rad/s, world frame."""
-        mover = self.state.mover[:, : self.bodies]
+        dynamic = self.state.dynamic[:, : self.bodies]
         inverse = self.of_bodies("inverse_inertia")
-        return self.spin(inverse, mover["orientation"], mover["angular_momentum"])
+        return self._angular_velocity_from(
+            inverse, dynamic["orientation"], dynamic["angular_momentum"]
+        )
 
     def write_parameters(self, worlds: Array, new: Parameters) -> None:
-        """Writes parameters [n, bodies] of the worlds of a mask, and what follows from them."""
+        """Writes parameters [n, bodies] of the worlds of a mask, and what depends on them."""
         assert self._layout is not None
         for mine, values in zip(self.parameters, new, strict=True):
             mine[worlds] = values
-        vary(self.model, self._layout, np.flatnonzero(worlds), new)
+        write_per_world(self.model, self._layout, np.flatnonzero(worlds), new)
 
-    def vary_bodies(self, worlds: Array, new: Parameters) -> None:
-        """Gives the worlds of a mask other parameters [n, bodies]; poses and velocities stay."""
+    def change_parameters(self, worlds: Array, new: Parameters) -> None:
+        """Changes the parameters [n, bodies] of the worlds of a mask; poses and velocities stay."""
         chosen, before = np.flatnonzero(worlds), self.parameters.pick(worlds)
-        rows = self.state.mover[worlds, : self.bodies]  # a copy
+        rows = self.state.dynamic[worlds, : self.bodies]  # a copy
         momentum, turning, orientation = (
             rows[name] for name in ("momentum", "angular_momentum", "orientation")
         )
         velocity = momentum * self.of_bodies("inverse_mass", chosen)[..., None]
-        spin = self.spin(self.of_bodies("inverse_inertia", chosen), orientation, turning)
+        angular_velocity = self._angular_velocity_from(
+            self.of_bodies("inverse_inertia", chosen), orientation, turning
+        )
         self.write_parameters(worlds, new)
-        # velocities stay; where nothing bears on them their momenta do, to the last bit
+        # where mass or inertia is unchanged, the momentum stays bitwise the same
         heavier = (new.mass != before.mass)[..., None]
         other = heavier | (new.size != before.size)[..., None]
         kept = velocity / self.of_bodies("inverse_mass", chosen)[..., None]
         rows["momentum"] = np.where(heavier, kept, momentum)
-        kept = spin_momentum(self.of_bodies("inertia", chosen), orientation, spin)
+        kept = angular_momentum_of(self.of_bodies("inertia", chosen), orientation, angular_velocity)
         rows["angular_momentum"] = np.where(other, kept, turning)
-        self.state.mover[worlds, : self.bodies] = rows
+        self.state.dynamic[worlds, : self.bodies] = rows
         self.forget(worlds)
 
     def _find_kernels(self) -> None:
@@ -228,11 +252,11 @@ class Simulation:
         self._readout = make_readout(self.features)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the kernels, which are found again by the features."""
+        """All attributes but the kernels, which follow from the features."""
         return {k: v for k, v in self.__dict__.items() if k not in ("_advance", "_readout")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Takes the attributes back and finds the kernels."""
+        """Restores the attributes and finds the kernels."""
         self.__dict__.update(state)
         self._find_kernels()
 
@@ -244,6 +268,6 @@ def read_only(values: Array) -> Array:
     return view
 
 
-def spin_momentum(inertia: Array, orientation: Array, spin: Array) -> Array:
+def angular_momentum_of(inertia: Array, orientation: Array, angular_velocity: Array) -> Array:
     """L = R J0 R^T omega, [..., 3], of principal moments [..., 3]."""
-    return rotate(orientation, inertia * rotate_back(orientation, spin))
+    return rotate(orientation, inertia * rotate_back(orientation, angular_velocity))

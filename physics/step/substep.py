@@ -1,14 +1,14 @@
-"""A substep, stage by stage. This file computes nothing: it names what happens, in order."""
+"""A substep, stage by stage. This file computes nothing: it lists what happens, in order."""
 
 from functools import cache
 
-from physics.collision.broadphase import make_candidates
-from physics.collision.compound_frames import make_parts
+from physics.collision.broadphase import make_broadphase
+from physics.collision.compound_frames import make_compound_frames
 from physics.impulse.solver import make_impulses
 from physics.jit import stage
 from physics.model.features import Features
-from physics.model.lanes import end_look
-from physics.motion.drives import make_drives, make_join
+from physics.model.lanes import end_refresh
+from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.gravity import gravity
 from physics.motion.integrator import make_drift, make_kick
 from physics.motion.kinematics import make_kinematics
@@ -17,51 +17,53 @@ from physics.spring.contacts import make_contacts
 
 @cache
 def make_forces(features: Features):
-    """The forces at the present positions, as the stages that add them.
+    """Stage that computes the forces at the present positions.
 
-    Velocities are those of the last drift, of `drifted` s, and so half of it old.
+    Velocities are those of the last drift, which took `drifted` s, so they lag positions by half of
+    it.
     """
     drives = make_drives(features)
-    join = make_join(features)
+    couple_fingers = make_finger_coupling(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
     @stage
-    def forces(model, state, work, g, h, drifted, elapsed):
-        gravity(model, work)
-        drives(model, work, drifted)
-        contacts(model, state, work, g, h, drifted, elapsed)
-        join(model, work, drifted)
+    def forces(model, state, workspace, g, h, drifted, elapsed):
+        gravity(model, workspace)
+        drives(model, workspace, drifted)
+        contacts(model, state, workspace, g, h, drifted, elapsed)
+        couple_fingers(model, workspace, drifted)
 
     return forces
 
 
 @cache
 def make_substep(features: Features):
-    """One step of the simulation layer, for the worlds of group g."""
+    """Stage of one substep for the worlds of lane group g."""
     kick = make_kick(features)
     drift = make_drift(features)
     kinematics = make_kinematics(features)
-    parts = make_parts(features)
-    candidates = make_candidates(features)
+    compound_frames = make_compound_frames(features)
+    broadphase = make_broadphase(features)
     forces = make_forces(features)
-    # A spring's force is there at a look; impulses are those of the half kick that comes first
-    glance = 0.5 if features.impulse else 0.0
+    # A spring's force follows from the positions. Impulses belong to a time: in a refresh, to that
+    # of the half kick that comes first
+    refresh_span = 0.5 if features.impulse else 0.0
 
     @stage
-    def substep(model, state, work, g, h, elapsed, opens, look):
-        """`opens` a collision step; a `look`: only forces, on states that were set from outside."""
-        if not look:
-            kick(model, work, 0.5 * h)
-            drift(model, work, h)
-        kinematics(model, work)
-        parts(model, work)
-        candidates(model, state, work, g, opens)
-        # named once: LLVM would have all of it twice
-        span, drifted = (glance * h, 0.0) if look else (h, h)
-        forces(model, state, work, g, span, drifted, elapsed)
-        if look:
-            end_look(model, state, work, g)
+    def substep(model, state, workspace, g, h, elapsed, starts_collision_step, refresh):
+        """`refresh`: only computes the forces of states that were set from outside."""
+        if not refresh:
+            kick(model, workspace, 0.5 * h)
+            drift(model, workspace, h)
+        kinematics(model, workspace)
+        compound_frames(model, workspace)
+        broadphase(model, state, workspace, g, starts_collision_step)
+        # a single call: two calls would be compiled twice
+        span, drifted = (refresh_span * h, 0.0) if refresh else (h, h)
+        forces(model, state, workspace, g, span, drifted, elapsed)
+        if refresh:
+            end_refresh(model, state, workspace, g)
         else:
-            kick(model, work, 0.5 * h)
+            kick(model, workspace, 0.5 * h)
 
     return substep

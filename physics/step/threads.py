@@ -29,7 +29,7 @@ def check_threads(threads: int | None) -> int:
     return default_threads() if threads is None else integer("threads", threads, low=1)
 
 
-def share_out(run: Callable[[int, int], int], count: int, threads: int) -> int:
+def run_in_blocks(run: Callable[[int, int], int], count: int, threads: int) -> int:
     """Sum of run(first, last) over blocks that cover the groups 0 <= g < count, on threads."""
     threads = min(threads, -(-count // _BLOCK))
     if threads == 1:
@@ -37,15 +37,15 @@ def share_out(run: Callable[[int, int], int], count: int, threads: int) -> int:
     block = max(_BLOCK, -(-count // (8 * threads)))
     firsts = iter(range(0, count, block))
 
-    def work() -> int:
+    def workspace() -> int:
         # next() on a range iterator is atomic under the GIL
         return sum(run(first, min(first + block, count)) for first in firsts)
 
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="worlds")
-    others = [_pools[threads].submit(work) for _ in range(threads - 1)]
+    others = [_pools[threads].submit(workspace) for _ in range(threads - 1)]
     try:
-        failed = work()
+        failed = workspace()
     finally:  # no thread may still write when the caller hears of an error
         wait(others)
     return failed + sum(other.result() for other in others)

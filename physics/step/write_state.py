@@ -7,7 +7,7 @@ import numpy as np
 
 from physics.model.features import NO_ROTATION
 from physics.scene.validation import array
-from physics.step.simulation import Simulation, spin_momentum
+from physics.step.simulation import Simulation, angular_momentum_of
 
 Array = np.ndarray
 
@@ -26,28 +26,30 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
     new = _checked(simulation, given, int(worlds.sum()))
     state, bodies, chosen = simulation.state, simulation.bodies, np.flatnonzero(worlds)
     # what isn't given stays: the spin, not its momentum, where only the orientation changes
-    spin = new.get("angular_velocity")
-    if spin is None and "orientation" in new:
-        turning = state.mover["angular_momentum"][worlds].any()
-        spin = simulation.angular_velocity()[worlds] if turning else None
+    angular_velocity = new.get("angular_velocity")
+    if angular_velocity is None and "orientation" in new:
+        turning = state.dynamic["angular_momentum"][worlds].any()
+        angular_velocity = simulation.angular_velocity()[worlds] if turning else None
     if "position" in new:
-        state.mover["position"][worlds, :bodies] = new["position"]
+        state.dynamic["position"][worlds, :bodies] = new["position"]
     if "orientation" in new:
-        state.mover["orientation"][worlds, :bodies] = new["orientation"]
+        state.dynamic["orientation"][worlds, :bodies] = new["orientation"]
     if "linear_velocity" in new:
         inverse = simulation.of_bodies("inverse_mass", chosen)
-        state.mover["momentum"][worlds, :bodies] = new["linear_velocity"] / inverse[..., None]
-    if spin is not None:
-        turn = state.mover["orientation"][worlds, :bodies]
+        state.dynamic["momentum"][worlds, :bodies] = new["linear_velocity"] / inverse[..., None]
+    if angular_velocity is not None:
+        turn = state.dynamic["orientation"][worlds, :bodies]
         inertia = simulation.of_bodies("inertia", chosen)
-        state.mover["angular_momentum"][worlds, :bodies] = spin_momentum(inertia, turn, spin)
+        state.dynamic["angular_momentum"][worlds, :bodies] = angular_momentum_of(
+            inertia, turn, angular_velocity
+        )
     if "drive_position" in new:
-        state.mover["position"][worlds, bodies:] = new["drive_position"]
-        state.mover["reference"][worlds, bodies:] = new["drive_position"]
-        state.mover["reference_velocity"][worlds, bodies:] = 0.0
+        state.dynamic["position"][worlds, bodies:] = new["drive_position"]
+        state.dynamic["reference"][worlds, bodies:] = new["drive_position"]
+        state.dynamic["reference_velocity"][worlds, bodies:] = 0.0
     if "drive_velocity" in new:
-        inverse = simulation.base.mover["inverse_mass"][bodies:, None]
-        state.mover["momentum"][worlds, bodies:] = new["drive_velocity"] / inverse
+        inverse = simulation.base.dynamic["inverse_mass"][bodies:, None]
+        state.dynamic["momentum"][worlds, bodies:] = new["drive_velocity"] / inverse
     if "time" in new:
         state.world["time"][worlds] = new["time"]
     simulation.forget(worlds)
@@ -55,7 +57,7 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
 
 def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> dict[str, Array]:
     """What is given as arrays [chosen, ...], unit quaternions included."""
-    bodies, drives = simulation.bodies, len(simulation.scene.tools)
+    bodies, drives = simulation.bodies, len(simulation.scene.driven_bodies)
     sizes = {
         "position": (bodies, 3),
         "orientation": (bodies, 4),

@@ -1,0 +1,220 @@
+"""Lists of candidates, one half-pair and one lane at a time: the narrow part of the broadphase.
+
+A list holds the samples that are nearer to the surface than the skin, in the order of their ids.
+When it is replaced, contacts that stay in it keep their memory. Slots behind the end of a list hold
+zeros: a weight of zero makes them no contact.
+"""
+
+import math
+from functools import cache
+
+from physics.collision.contact_point import TOUCH_TOLERANCE
+from physics.collision.distances import core_distance
+from physics.collision.manifold import add_manifold_point
+from physics.collision.separations import make_separations, separation_bound
+from physics.collision.surface_kinds import by_surface_kind
+from physics.jit import LANES, at, kernel
+from physics.model.contact_memory import contact_memory
+from physics.scene.shapes import PARTICLES, PLANE
+
+
+@cache
+def make_clear(features):
+    """Kernel that empties a slot in one lane."""
+    memory_size = contact_memory(features).size
+    impulse, particles = features.impulse, features.particles
+
+    @kernel
+    def clear(row, i):
+        row.weight[i] = 0.0
+        for m in range(memory_size):
+            row.memory[m, i] = 0.0
+        for axis in range(3):
+            row.sample[axis, i] = 0.0
+            if impulse:
+                row.impact_force[axis, i] = 0.0
+            if particles:
+                row.partner[axis, i] = 0.0
+
+    return clear
+
+
+@cache
+def make_add_candidate(features):
+    """Kernel that writes a candidate into a slot, with the memory that its sample had before."""
+    memory_size, impulse = contact_memory(features).size, features.impulse
+
+    @kernel
+    def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight):
+        """`old`: the list before, `count` long; ids below `cursor` are done. Returns the cursor."""
+        while cursor < count and old[cursor].sample_id < sample_id:
+            cursor += 1
+        known = cursor < count and old[cursor].sample_id == sample_id
+        row.sample[0, i] = x
+        row.sample[1, i] = y
+        row.sample[2, i] = z
+        row.weight[i] = weight
+        for m in range(memory_size):
+            row.memory[m, i] = old[cursor].memory[m] if known else 0.0
+        if impulse:
+            for axis in range(3):
+                row.impact_force[axis, i] = 0.0
+        return cursor
+
+    return add_candidate
+
+
+@cache
+def make_list_samples(features):
+    """Kernel that fills the list of a half-pair in one lane."""
+    impulse, particles = features.impulse, features.particles
+    per_world_parameters = features.per_world_parameters
+    add_candidate = make_add_candidate(features)
+    separations = make_separations(features)
+    distance = by_surface_kind(
+        features, lambda kind: None if kind == PARTICLES else core_distance(kind)
+    )
+
+    @kernel
+    def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):
+        """Fills the list, and the manifold points of the impulse law.
+
+        Args:
+            model: of the lane group.
+            state: of all worlds.
+            workspace: of the lane group; `workspace.old` holds the list before.
+            g: lane group.
+            k: half-pair.
+            i: lane.
+            relative: the owner in the frame of the surface.
+            old_count: length of the list before.
+            first_point: row of workspace.manifold at which this half-pair's points begin.
+            reach: m, separations up to which samples are listed.
+
+        Returns:
+            Length of the list, and m of relative motion for which it stays complete.
+        """
+        half_pair, old = model.half_pair[k], workspace.old
+        first, room = half_pair.first_slot, half_pair.slot_count
+        candidate = state.candidate[g, first : first + room]
+        ids = state.sample_id[g, first : first + room]
+        R, c = relative.rotation, relative.position
+        height = at(half_pair.core[0], i) if half_pair.kind == PLANE else 0.0
+        radius, load_share = at(half_pair.radius, i), at(half_pair.load_share, i)
+        n = 0
+        cursor = 0
+        nearest = 1e300
+        pairs = particles and half_pair.partner_count > 0
+        if not pairs:
+            separations(model, half_pair, i, relative, workspace.separation)
+        for s in range(half_pair.sample_count):
+            separation = 0.0 if pairs else workspace.separation[s]
+            if not pairs and not separation < reach:
+                nearest = min(nearest, separation)
+                continue
+            sample = model.sample[:, half_pair.first_sample + s]
+            sx, sy, sz, weight = sample[0], sample[1], sample[2], load_share * sample[3]
+            if per_world_parameters:
+                size = at(half_pair.owner_size, i)
+                sx, sy, sz = size * sx, size * sy, size * sz
+            x = R[0, i] * sx + R[1, i] * sy + R[2, i] * sz + c[0, i]
+            y = R[3, i] * sx + R[4, i] * sy + R[5, i] * sz + c[1, i]
+            z = R[6, i] * sx + R[7, i] * sy + R[8, i] * sz + c[2, i] - height
+            if pairs:
+                for j in range(half_pair.partner_count):
+                    p = model.sample[:, half_pair.first_partner + j]
+                    px, py, pz = p[0], p[1], p[2]
+                    if per_world_parameters:
+                        size = at(half_pair.surface_size, i)
+                        px, py, pz = size * px, size * py, size * pz
+                    ux, uy, uz = x - px, y - py, z - pz
+                    separation = math.sqrt(ux * ux + uy * uy + uz * uz) - radius
+                    if separation < reach and n == room:
+                        state.world[g * LANES + i].overflow = 1
+                    elif separation < reach:
+                        row, pair_id = candidate[n], s * half_pair.partner_count + j
+                        smaller = min(weight, p[3])
+                        cursor = add_candidate(
+                            row, i, old, cursor, old_count, pair_id, sx, sy, sz, smaller
+                        )
+                        row.partner[0, i] = px
+                        row.partner[1, i] = py
+                        row.partner[2, i] = pz
+                        ids[n, i] = pair_id
+                        n += 1
+                    elif separation < nearest:
+                        nearest = separation
+            else:
+                if impulse:
+                    core, face_normals = half_pair.core, half_pair.face_normals != 0
+                    ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                    _, nx, ny, nz = distance(
+                        half_pair.kind, x, y, z, ca, cb, cc, radius, face_normals
+                    )
+                    add_manifold_point(
+                        workspace.manifold[first_point + n],
+                        workspace.solid[half_pair.frame],
+                        i,
+                        x,
+                        y,
+                        z + height,
+                        nx,
+                        ny,
+                        nz,
+                        separation,
+                    )
+                cursor = add_candidate(
+                    candidate[n], i, old, cursor, old_count, s, sx, sy, sz, weight
+                )
+                ids[n, i] = s
+                n += 1
+        return n, reach if n > 0 else nearest
+
+    return list_samples
+
+
+@cache
+def make_search(features):
+    """Kernel that replaces the list of a half-pair in one lane."""
+    memory_size, impulse = contact_memory(features).size, features.impulse
+    clear, list_samples = make_clear(features), make_list_samples(features)
+
+    @kernel
+    def search(model, state, workspace, g, k, i, relative, first_point, relative_motion):
+        """`relative_motion`: m, upper bound of that of the last drift; others: `list_samples`."""
+        half_pair, live = model.half_pair[k], workspace.half_pair[k]
+        first, before = half_pair.first_slot, live.count[i]
+        c = relative.position
+        # bounding spheres, or a bounding sphere over a plane
+        if half_pair.kind == PLANE:
+            separation = c[2, i] - at(half_pair.core[0], i) - at(half_pair.owner_reach, i)
+        else:
+            distance = math.sqrt(c[0, i] * c[0, i] + c[1, i] * c[1, i] + c[2, i] * c[2, i])
+            separation = distance - at(half_pair.owner_reach, i) - at(half_pair.surface_reach, i)
+        if half_pair.partner_count == 0:
+            separation = max(separation, separation_bound(half_pair, i, relative))
+        reach = at(half_pair.skin, i)
+        if impulse and half_pair.partner_count == 0:
+            # samples that touch by the middle of the next drift collide before they overlap; more
+            # than `find_impacts` accepts, by more than round-off
+            reach = max(reach, 0.5 * relative_motion + 2.0 * TOUCH_TOLERANCE)
+        count = 0
+        remaining_skin = separation
+        if not separation > reach:
+            for n in range(before):
+                old, row = workspace.old[n], state.candidate[g, first + n]
+                old.sample_id = state.sample_id[g, first + n, i]
+                for m in range(memory_size):
+                    old.memory[m] = row.memory[m, i]
+            count, remaining_skin = list_samples(
+                model, state, workspace, g, k, i, relative, before, first_point, reach
+            )
+        for n in range(count, before):
+            clear(state.candidate[g, first + n], i)
+        live.count[i] = count
+        live.remaining_skin[i] = remaining_skin
+        if count == 0:
+            live.previous_weight[i] = 0.0
+            live.previous_normal_force[i] = 0.0
+
+    return search

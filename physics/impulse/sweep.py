@@ -1,0 +1,129 @@
+"""Sequential impulses: one sweep over the contact rows of a half-pair.
+
+A soft contact is a spring k and damper c whose force is that at the end of the step. With
+a = h (c + h k), effective mass m and the impulse p so far, p changes by
+
+    -(u n + k h/a separation + p/a) m a/(m + a),
+
+which is stable at any step, for any k. At rest it sinks as the spring of that stiffness would,
+load / k. The speed at which overlapping bodies are pushed apart is limited.
+
+Friction is rigid: it removes the sliding velocity that remains, with at most mu times the normal
+impulse. An anchor remembers how far the point has crept since it came to stick, and pulls it back.
+The effective mass across the normal is the smallest in any direction, so that a step can only
+decrease the energy even where the cone cuts it. Resistance against rolling and spinning is the same
+law for the relative angular velocity.
+"""
+
+import math
+from functools import cache
+
+from physics.impulse.point_impulses import apply_angular_impulse, apply_impulse, relative_velocity
+from physics.jit import LANES, at, kernel, stage
+
+# m/s, largest speed at which overlapping bodies are pushed apart
+MAX_PUSH_OUT_SPEED = 1.0
+# 1/s, rate at which an anchor pulls back what has crept
+ANCHOR_RATE = 5.0
+# 1/s, rate at which an anchor forgets. Two points at the same place that came to stick at different
+# times could otherwise be at rest only by pulling against each other, ever harder
+ANCHOR_DECAY = 0.1
+
+
+@stage
+def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
+    """Corrects the angular impulse of a point against rolling and spinning."""
+    owner, surface, A, B = pair.owner[0], pair.surface[0], pair.A, pair.B
+    nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+    # lower bound of the moment of inertia, by the largest row sum of its inverse
+    xx, yy, zz = A[0, i] + B[0, i], A[1, i] + B[1, i], A[2, i] + B[2, i]
+    xy, xz, yz = abs(A[3, i] + B[3, i]), abs(A[4, i] + B[4, i]), abs(A[5, i] + B[5, i])
+    inertia = 1.0 / max(max(xx + xy + xz, xy + yy + yz), max(xz + yz + zz, 1e-300))
+    wx = owner.angular_velocity[0, i] - surface.angular_velocity[0, i]
+    wy = owner.angular_velocity[1, i] - surface.angular_velocity[1, i]
+    wz = owner.angular_velocity[2, i] - surface.angular_velocity[2, i]
+    px, py, pz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
+    qx, qy, qz = px - inertia * wx, py - inertia * wy, pz - inertia * wz
+    along = qx * nx + qy * ny + qz * nz
+    qx, qy, qz = qx - along * nx, qy - along * ny, qz - along * nz
+    along = min(max(along, -spinning * normal_impulse), spinning * normal_impulse)
+    size = math.sqrt(qx * qx + qy * qy + qz * qz)
+    cut = rolling * normal_impulse / size if size > rolling * normal_impulse else 1.0
+    qx, qy, qz = cut * qx + along * nx, cut * qy + along * ny, cut * qz + along * nz
+    point.twist[0, i] = qx
+    point.twist[1, i] = qy
+    point.twist[2, i] = qz
+    apply_angular_impulse(pair, i, qx - px, qy - py, qz - pz)
+
+
+@cache
+def make_sweep(features):
+    """Kernel that corrects the impulses of a half-pair's points, one after another."""
+    friction, resistance = features.friction, features.resistance
+
+    @kernel
+    def sweep(pair, constants, h, soft):
+        """`soft`: with the bias that pushes overlapping bodies apart, by soft contacts."""
+        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+        frictions, floors = constants.friction, constants.rest_speed
+        stiffness, damping = constants.stiffness, constants.damping
+        rolling, spinning = constants.rolling, constants.spinning
+        per_h = 1.0 / h
+        for n in range(points.shape[0]):
+            point = points[n]
+            for i in range(LANES):
+                mu, floor = at(frictions, i), at(floors, i)
+                K, C = at(stiffness, i), at(damping, i)
+                rate = K / (C + h * K)
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+                separation, weight = point.separation[i], point.weight[i]
+                m, before = point.mass[i], point.normal_impulse[i]
+                ux, uy, uz = relative_velocity(owner, surface, point, i)
+                un = ux * nx + uy * ny + uz * nz
+                apart = separation > 0.0
+                bias = separation * per_h if apart else 0.0
+                mass, leak = m, 0.0
+                if soft:
+                    a = h * weight * (C + h * K)
+                    yields = not apart
+                    leak = m / (m + a) if yields else 0.0
+                    mass = a * leak if yields else m
+                    bias = max(rate * separation, -MAX_PUSH_OUT_SPEED) if yields else bias
+                # what is about to collide must arrive at its full speed
+                bias = -un if apart & (un < -floor) else bias
+                new = max(before - mass * (un + bias) - leak * before, 0.0)
+                new = new if weight > 0.0 else 0.0
+                step = new - before
+                point.normal_impulse[i] = new
+                apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
+                if friction:
+                    tangential, anchor = point.tangential_impulse, point.anchor
+                    ux, uy, uz = relative_velocity(owner, surface, point, i)
+                    un = ux * nx + uy * ny + uz * nz
+                    sx, sy, sz = ux - un * nx, uy - un * ny, uz - un * nz
+                    if soft:
+                        sx += ANCHOR_RATE * anchor[0, i]
+                        sy += ANCHOR_RATE * anchor[1, i]
+                        sz += ANCHOR_RATE * anchor[2, i]
+                    mt = point.shear_mass[i]
+                    px, py, pz = tangential[0, i], tangential[1, i], tangential[2, i]
+                    qx, qy, qz = px - mt * sx, py - mt * sy, pz - mt * sz
+                    limit = mu * new
+                    size = math.sqrt(qx * qx + qy * qy + qz * qz)
+                    cut = limit / size if size > limit else 1.0
+                    qx *= cut
+                    qy *= cut
+                    qz *= cut
+                    tangential[0, i] = qx
+                    tangential[1, i] = qy
+                    tangential[2, i] = qz
+                    if soft:
+                        held = 1.0 - h * ANCHOR_DECAY if size <= limit else 0.0
+                        anchor[0, i] *= held
+                        anchor[1, i] *= held
+                        anchor[2, i] *= held
+                    apply_impulse(pair, point, i, qx - px, qy - py, qz - pz)
+                if resistance:
+                    resist_rotation(pair, point, i, new, rolling, spinning)
+
+    return sweep

@@ -1,0 +1,57 @@
+"""What a contact remembers from step to step: one record, described once.
+
+Every candidate has `size` doubles of memory per lane, as rows of an array [size, LANES]. Which rows
+exist depends on the features of the scene; `ContactMemory` gives the first row of each quantity.
+Kernels that copy or clear a memory treat it as a block and need not know what is in it.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+from physics.model.features import Features
+
+
+class ContactMemory(NamedTuple):
+    """First row of each quantity, -1 where the scene has none; and the number of rows.
+
+    Attributes:
+        size: rows in all.
+        normal_force: 1 row, N, of the last step.
+        impact_speed: 1 row, m/s, see `hunt_crossley_force`. Spring law.
+        approach: 1 row, m/s, in the last step. Spring law.
+        shear: 3 rows, m. Spring law: of the tangential spring. Impulse law: of the anchor.
+        tangential_force: 3 rows, N, of the last step, in the surface's frame. Impulse law.
+        twist: 3 rows. Spring law: rad, of the spring against rolling and spinning. Impulse law:
+            N m, torque of the last step.
+        face: 1 row, the face of a box through which the sample came in, see `box_distance`.
+    """
+
+    size: int
+    normal_force: int = -1
+    impact_speed: int = -1
+    approach: int = -1
+    shear: int = -1
+    tangential_force: int = -1
+    twist: int = -1
+    face: int = -1
+
+
+@cache
+def contact_memory(features: Features) -> ContactMemory:
+    """The memory that contacts of a scene with these features have."""
+    coulomb = features.friction and not features.viscous
+    rows = {
+        "normal_force": 1,
+        "impact_speed": 0 if features.impulse else 1,
+        "approach": 0 if features.impulse else 1,
+        "shear": 3 if coulomb else 0,
+        "tangential_force": 3 if coulomb and features.impulse else 0,
+        "twist": 3 if features.resistance else 0,
+        "face": 1 if features.box else 0,
+    }
+    size, first = 0, {}
+    for name, count in rows.items():
+        if count:
+            first[name] = size
+            size += count
+    return ContactMemory(size, **first)

@@ -1,0 +1,221 @@
+"""Contact forces of the candidates of one half-pair against one kind of surface.
+
+Everything is computed in the frame of the surface, where the surface is at rest. A slot holds one
+candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vectorise it.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from physics.collision.contact_point import HIDDEN, make_touch
+from physics.jit import LANES, at, kernel
+from physics.model.contact_memory import contact_memory
+from physics.scene.shapes import BOX, PLANE
+from physics.spring.coulomb import friction_force, twist_torque, viscous_force
+from physics.spring.energy_correction import rotational_inverse_mass
+from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
+
+# one row per slot: what `World.contacts` reports of the candidates there
+REPORT = np.dtype(
+    [
+        ("penetration", "f8", (LANES,)),  # m
+        ("point", "f8", (3, LANES)),  # m, in the frame of the surface, as the next two
+        ("normal", "f8", (3, LANES)),
+        ("force", "f8", (3, LANES)),  # N, on the owner
+        ("weight", "f8", (LANES,)),
+    ],
+    align=True,
+)
+
+
+@cache
+def make_contact_loop(features, kind, report):
+    """Loop over the slots of a half-pair; with `report` it also writes a row for each candidate."""
+    viscous, resistance = features.viscous, features.resistance
+    friction = features.friction and not viscous
+    normal_force = dashpot_force if features.dashpot else hunt_crossley_force
+    plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    touch = make_touch(features, kind)
+    memory_rows = contact_memory(features)
+    FORCE, SPEED, APPROACH = (
+        memory_rows.normal_force,
+        memory_rows.impact_speed,
+        memory_rows.approach,
+    )
+    SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
+
+    @kernel
+    def contact_loop(slots, candidate, relative, constants, h, rows):
+        R, c = relative.rotation, relative.position
+        v, omega = relative.velocity, relative.angular_velocity
+        force, torque, normal_force_sum = relative.force, relative.torque, relative.normal_force_sum
+        radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
+        stiffness, damping, floors = constants.stiffness, constants.damping, constants.rest_speed
+        shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
+        frictions, pair_mass = constants.friction, constants.pair_mass
+        load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
+        current_weight, remembers = relative.current_weight, relative.updates_memory
+        inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
+        face_normals = constants.face_normals != 0
+        rolling, spinning = constants.rolling, constants.spinning
+        twist_stiffness, twist_damping = constants.twist_stiffness, constants.twist_damping
+        for n in range(slots):
+            row = candidate[n]
+            weights, memory = row.weight, row.memory
+            for i in range(LANES):
+                weight, mu = weights[i], at(frictions, i)
+                radius, owner_radius = at(radii, i), at(owner_radii, i)
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                k, a, floor = at(stiffness, i), at(damping, i), at(floors, i)
+                shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
+                mass, load_rate = at(pair_mass, i), load_rates[i]
+                inverse_mass = 1.0 / mass
+                rx, ry, rz, nx, ny, nz, penetration, face = touch(
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, face_normals
+                )
+                if box and compound:
+                    weight = 0.0 if face == HIDDEN else weight
+                if not plane:
+                    rotational = rotational_inverse_mass(
+                        at(inverse_inertia[0], i),
+                        at(inverse_inertia[1], i),
+                        at(inverse_inertia[2], i),
+                        rx + c[0, i] - at(centre[0], i),
+                        ry + c[1, i] - at(centre[1], i),
+                        rz + c[2, i] - at(centre[2], i),
+                        nx,
+                        ny,
+                        nz,
+                    )
+                    inverse_mass += rotational
+                    load_rate *= 1.0 / (1.0 + mass * rotational)
+                ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
+                uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
+                uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
+                approach = -uz if plane else -(ux * nx + uy * ny + uz * nz)
+                impact_speed = memory[SPEED, i]
+                if box:  # a sample that changed the face is a new contact
+                    same = (face == memory[FACE, i]) | (not face_normals)
+                    impact_speed = impact_speed if same else 0.0
+                normal, impact_speed, persistence = normal_force(
+                    penetration,
+                    approach,
+                    k,
+                    a,
+                    floor,
+                    inverse_mass,
+                    h,
+                    load_rate,
+                    inverse_mean_forces[i],
+                    impact_speed,
+                    memory[FORCE, i],
+                    memory[APPROACH, i],
+                )
+                # an empty slot stays empty, whatever the lane's state
+                normal = normal if weight > 0.0 else 0.0
+                impact_speed = impact_speed if weight > 0.0 else 0.0
+                updates_memory = remembers[i] != 0.0
+                memory[SPEED, i] = impact_speed if updates_memory else memory[SPEED, i]
+                memory[FORCE, i] = normal if updates_memory else memory[FORCE, i]
+                kept = approach if weight > 0.0 else 0.0
+                memory[APPROACH, i] = kept if updates_memory else memory[APPROACH, i]
+                current_weight[i] += weight if normal > 0.0 else 0.0
+                if box:
+                    face = face if weight > 0.0 else 0.0
+                    memory[FACE, i] = face if updates_memory else memory[FACE, i]
+                if plane:
+                    fx, fy, fz = 0.0, 0.0, normal
+                else:
+                    fx, fy, fz = normal * nx, normal * ny, normal * nz
+                if friction:
+                    sx, sy, sz = memory[SHEAR, i], memory[SHEAR + 1, i], memory[SHEAR + 2, i]
+                    if plane:
+                        gx, gy, gz, sx, sy, sz = friction_force(
+                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, persistence
+                        )
+                        fx += gx
+                        fy += gy
+                    else:
+                        along = sx * nx + sy * ny + sz * nz
+                        gx, gy, gz, sx, sy, sz = friction_force(
+                            normal,
+                            ux + approach * nx,
+                            uy + approach * ny,
+                            uz + approach * nz,
+                            shear_k,
+                            shear_c,
+                            mu,
+                            h,
+                            sx - along * nx,
+                            sy - along * ny,
+                            sz - along * nz,
+                            persistence,
+                        )
+                        fx += gx
+                        fy += gy
+                        fz += gz
+                        memory[SHEAR + 2, i] = sz if updates_memory else memory[SHEAR + 2, i]
+                    memory[SHEAR, i] = sx if updates_memory else memory[SHEAR, i]
+                    memory[SHEAR + 1, i] = sy if updates_memory else memory[SHEAR + 1, i]
+                if viscous:
+                    gx, gy, gz = viscous_force(
+                        normal,
+                        ux + approach * nx,
+                        uy + approach * ny,
+                        uz + approach * nz,
+                        shear_c,
+                        mu,
+                    )
+                    fx += gx
+                    fy += gy
+                    fz += gz
+                if resistance:
+                    tx, ty, tz, sx, sy, sz = twist_torque(
+                        normal,
+                        omega[0, i],
+                        omega[1, i],
+                        omega[2, i],
+                        nx,
+                        ny,
+                        nz,
+                        at(twist_stiffness, i),
+                        at(twist_damping, i),
+                        rolling,
+                        spinning,
+                        h,
+                        memory[TWIST, i],
+                        memory[TWIST + 1, i],
+                        memory[TWIST + 2, i],
+                    )
+                    memory[TWIST, i] = sx if updates_memory else memory[TWIST, i]
+                    memory[TWIST + 1, i] = sy if updates_memory else memory[TWIST + 1, i]
+                    memory[TWIST + 2, i] = sz if updates_memory else memory[TWIST + 2, i]
+                    torque[0, i] += tx * weight if weight > 0.0 else 0.0
+                    torque[1, i] += ty * weight if weight > 0.0 else 0.0
+                    torque[2, i] += tz * weight if weight > 0.0 else 0.0
+                fx = fx * weight if weight > 0.0 else 0.0
+                fy = fy * weight if weight > 0.0 else 0.0
+                fz = fz * weight if weight > 0.0 else 0.0
+                force[0, i] += fx
+                force[1, i] += fy
+                force[2, i] += fz
+                torque[0, i] += ry * fz - rz * fy
+                torque[1, i] += rz * fx - rx * fz
+                torque[2, i] += rx * fy - ry * fx
+                normal_force_sum[i] += weight * normal
+                if report:
+                    out = rows[n]
+                    out.penetration[i] = penetration
+                    out.point[0, i] = rx + c[0, i]
+                    out.point[1, i] = ry + c[1, i]
+                    out.point[2, i] = rz + c[2, i]
+                    out.normal[0, i] = 0.0 if plane else nx
+                    out.normal[1, i] = 0.0 if plane else ny
+                    out.normal[2, i] = 1.0 if plane else nz
+                    out.force[0, i] = fx
+                    out.force[1, i] = fy
+                    out.force[2, i] = fz
+                    out.weight[i] = weight
+
+    return contact_loop
