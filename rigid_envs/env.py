@@ -8,7 +8,8 @@ from gymnasium.envs.registration import EnvSpec
 
 from physics import Fidelity
 from rigid_envs.episodes.arguments import argument_names, make_task
-from rigid_envs.episodes.runner import Observation, Runner, check_seed
+from rigid_envs.episodes.checks import check_seed
+from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward

@@ -10,7 +10,8 @@ from gymnasium.vector.utils import batch_space
 from physics import Fidelity
 from physics.scene.validation import choice, integer
 from rigid_envs.episodes.arguments import argument_names, make_task
-from rigid_envs.episodes.runner import KEEP_SEED, Observation, Runner, check_seed
+from rigid_envs.episodes.checks import KEEP_SEED, check_seed
+from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward

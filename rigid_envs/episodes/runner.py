@@ -9,9 +9,10 @@ from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Snapshot, World
 from physics.jit import columns
-from physics.scene.validation import choice, instance, integer
+from physics.scene.validation import choice, instance
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.bounds import clip
+from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.draws import uniform
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
@@ -23,10 +24,6 @@ Array = np.ndarray
 Observation = dict[str, Array]
 
 STATE_VERSION = 2
-# so that a seed plus the index of a world fits into an int64 too
-MAX_SEED = 2**62
-# in place of a seed: the world continues its own sequence of episodes
-KEEP_SEED = -1
 
 
 class Step(NamedTuple):
@@ -90,7 +87,7 @@ class Runner:
         if per_world:
             self.randomization.check_step(self.world, ranges)
         self.count = count
-        self.max_episode_steps = _step_limit(self.task, max_episode_steps)
+        self.max_episode_steps = step_limit(self.task, max_episode_steps)
         if not isinstance(terminate_on_success, bool | np.bool_):
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
@@ -377,29 +374,6 @@ class Runner:
         self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
         self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]
         self._seeded = bool(np.all(self._episodes >= 0))
-
-
-def check_seed(field: str, value: Any) -> int:
-    """`value` as a seed.
-
-    Raises:
-        TypeError, ValueError: not an integer from 0 to MAX_SEED; the message names `field`.
-    """
-    seed = integer(field, value, low=0)
-    if seed > MAX_SEED:
-        raise ValueError(f"{field} must be at most 2**62, got {value!r}")
-    return seed
-
-
-def _step_limit(task: Task, max_episode_steps: Any) -> int | None:
-    """Number of steps after which episodes are truncated; None for no limit."""
-    field = "max_episode_steps"
-    if max_episode_steps is None:
-        field, max_episode_steps = f"{type(task).__name__}.{field}", task.max_episode_steps
-    steps = integer(field, max_episode_steps, low=-(2**31))
-    if steps < 1 and steps != -1:
-        raise ValueError(f"{field} must be at least 1, or -1 for no limit, got {steps}")
-    return None if steps == -1 else steps
 
 
 def _limits(bounds: tuple[tuple[str, str, float, float], ...]) -> tuple[Array, Array]:
