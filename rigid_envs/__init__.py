@@ -1,4 +1,16 @@
-"""Gymnasium environments on the particle-based rigid-body engine of `physics`."""
+"""Gymnasium environments on the rigid-body engine `physics`.
+
+Importing this package registers the ids `RigidEnvs/Push-v0`, `RigidEnvs/Stack-v0` and
+`RigidEnvs/Throw-v0`, and the same ids with a dense reward, such as `RigidEnvs/PushDense-v0`.
+`gym.register_envs` has no effect, but shows linters that the import is used:
+
+    import gymnasium as gym
+    import rigid_envs
+
+    gym.register_envs(rigid_envs)
+    env = gym.make("RigidEnvs/Push-v0")
+    envs = gym.make_vec("RigidEnvs/Push-v0", num_envs=4096)
+"""
 
 from rigid_envs.env import RigidEnv
 from rigid_envs.episodes.runner import Runner

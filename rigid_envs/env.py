@@ -1,13 +1,15 @@
-"""One world as a Gymnasium environment."""
+"""The single environment: one world as a Gymnasium environment."""
 
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
 from physics import Fidelity
-from rigid_envs.episodes.arguments import make_task, words
-from rigid_envs.episodes.runner import Observation, Runner, check_seed
+from rigid_envs.episodes.arguments import argument_names, make_task
+from rigid_envs.episodes.checks import check_seed
+from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward
@@ -19,24 +21,28 @@ class RigidEnv(gym.Env[Observation, Array]):
     """A task in one world.
 
     Args:
-        task: a task's name or class, or a task.
-        reward_type: "sparse": -1 or 0; "dense": shaped.
+        task: name, class or object of a task.
+        reward_type: "sparse" (-1 or 0) or "dense" (shaped).
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" or "human".
         show_forces: draw contact forces.
-        show_particles: draw what the solids touch with in place of their exact shapes.
-        render_size: width and height of a picture in pixels.
-        max_episode_steps: truncate after so many steps; None leaves that to gym.make's TimeLimit.
-        terminate_on_success: end an episode when it is solved.
-        randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
-            see `rigid_envs.episodes.randomization.Randomization`.
-        observe_parameters: what `randomize` names is observed too.
-        guided: what is left to do is observed too, as the task tells it from both goals. Not for
-            learners that relabel goals (HER): they would read the goal that was.
-        **arguments: of the task, as `blocks`.
+        show_particles: draw the collision samples of the solids in their outlines.
+        render_size: width and height of a frame in pixels.
+        max_episode_steps: number of steps after which an episode is truncated; the task's number if
+            None, no limit if -1. `gym.make` does not pass its own argument of this name on: it
+            wraps the environment in a TimeLimit, which then replaces the task's number.
+        terminate_on_success: whether success terminates an episode.
+        randomize: ranges of parameters that are drawn for each episode, such as
+            {"mass": (0.5, 2.0)}; see `rigid_envs.episodes.randomization.Randomization`.
+        observe_parameters: append the drawn parameters to the observation.
+        observe_task_guide: append the task's guide to the observation: what is left to do, computed
+            from both goals. Do not use it with learners that relabel goals (HER): the guide would
+            still show the original goal.
+        **arguments: arguments of the task, such as `blocks`.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -51,13 +57,13 @@ class RigidEnv(gym.Env[Observation, Array]):
         terminate_on_success: bool = False,
         randomize: Any = None,
         observe_parameters: bool = False,
-        guided: bool = False,
+        observe_task_guide: bool = False,
         **arguments: Any,
     ) -> None:
-        """Builds the world; an episode begins with `reset`."""
+        """Builds the world. Call `reset` to start an episode."""
         self.render_mode = render_mode
         self._runner = Runner(
-            make_task(task, arguments, words(RigidEnv)),
+            make_task(task, arguments, argument_names(RigidEnv)),
             1,
             reward_type,
             fidelity,
@@ -66,8 +72,9 @@ class RigidEnv(gym.Env[Observation, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
-            guided,
+            observe_task_guide,
         )
+        self._limit_is_default = max_episode_steps is None
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, size=render_size
         )
@@ -75,22 +82,38 @@ class RigidEnv(gym.Env[Observation, Array]):
         self.action_space = self._runner.action_space
 
     @property
+    def spec(self) -> EnvSpec | None:
+        """Gymnasium's specification of the environment, which `gym.make` sets."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec
+        # gym.make limits episodes by a TimeLimit: without this line,
+        # gym.make(id, max_episode_steps=200) would still end episodes after the task's number
+        if spec is not None and self._limit_is_default:
+            self._runner.max_episode_steps = None
+
+    @property
     def task(self) -> Task:
-        """What is to be done in the world."""
+        """The task."""
         return self._runner.task
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode: the seed's first, or the next one.
+        """Starts an episode: the first one of a seed, or the next one.
 
-        options["randomize"] gives other ranges from this episode on; None, the constructor's.
+        Args:
+            seed: an integer from 0 to 2**62. Without a seed at the first reset, one is drawn.
+            options: {"randomize": ranges} replaces the ranges from this episode on; None restores
+                those of the constructor.
 
         Raises:
-            TypeError, ValueError: a bad seed, an unknown option.
+            TypeError, ValueError: an invalid seed, or an unknown option.
         """
         if set(options or {}) - {"randomize"}:
-            raise ValueError(f'options knows only "randomize", got {options!r}')
+            raise ValueError(f'options accepts only "randomize", got {options!r}')
         seed = None if seed is None else check_seed("seed", seed)
         super().reset(seed=seed)
         if seed is None and not self._runner.seeded:
@@ -103,12 +126,12 @@ class RigidEnv(gym.Env[Observation, Array]):
         return _first(observation), _first_info(info)
 
     def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Advances by a frame of 40 ms.
+        """Advances by one step of 40 ms.
 
         Raises:
-            ValueError: an action of the wrong shape or with NaN; the state is then as it was.
-            gymnasium.error.ResetNeeded: before the first reset.
-            SimulationDiverged: the state turned non-finite.
+            ValueError: the action has another shape or contains NaN. No state has changed then.
+            gymnasium.error.ResetNeeded: the environment has not been reset yet.
+            SimulationDiverged: the world has diverged. `reset` starts a new episode.
         """
         if not self._runner.seeded:
             raise gym.error.ResetNeeded("reset() must be called before step()")
@@ -130,17 +153,41 @@ class RigidEnv(gym.Env[Observation, Array]):
 
     @property
     def reward(self) -> Reward:
-        """How goals and raw terms make the reward; wrappers ask it when goals agree."""
+        """Threshold and weights of the reward. Reward wrappers read it."""
         return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., goal]; see `rigid_envs.tasks.rewards.Reward.compute`.
+        """The reward of pairs of goals, as HER needs it.
+
+        Args:
+            achieved_goal: [..., goal].
+            desired_goal: [..., goal].
+            info: the info of the step: a dict, or a sequence of dicts for a batch. The sparse
+                reward ignores it.
+
+        Returns:
+            Rewards [...]; a float for a single pair.
 
         Raises:
-            ValueError: with the dense reward, other goals than those of the info's step.
+            ValueError: with the dense reward, other goals than those of the step, or no info.
         """
-        runner = self._runner
-        return runner.reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
+        return self._runner.compute_reward(achieved_goal, desired_goal, info)
+
+    def compute_terminated(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
+        """Whether [...] a step with these goals [..., goal] terminates the episode.
+
+        True where the goals count as success and `terminate_on_success` is set. `info` is ignored.
+        """
+        return self._runner.compute_terminated(achieved_goal, desired_goal)
+
+    def compute_truncated(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
+        """Whether [...] a step was truncated for another reason than the number of steps.
+
+        True where `info`, the info of the step (a dict, or a sequence of dicts for a batch), has a
+        true "out_of_bounds". Goals do not cause truncation, and the limit of steps is not included:
+        neither goals nor info hold the number of steps.
+        """
+        return self._runner.compute_truncated(achieved_goal, info)
 
     def render(self) -> Array | None:
         """A frame [480, 480, 3] uint8 in "rgb_array" mode; draws the window in "human" mode."""
@@ -155,15 +202,19 @@ class RigidEnv(gym.Env[Observation, Array]):
         return self._pictures.frames()[0]
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that the episode holds."""
+        """The complete state of the episode; it can be pickled."""
         return self._runner.get_state()
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Takes the episode back to what `get_state` gave, to the last bit."""
+        """Restores a state from `get_state`; the episode then continues bitwise identically.
+
+        Raises:
+            ValueError: not such a state, or one of another scene, fidelity or version.
+        """
         self._runner.set_state(state)
 
     def close(self) -> None:
-        """Closes the window, if any."""
+        """Closes the window, if there is one."""
         self._pictures.close()
 
 

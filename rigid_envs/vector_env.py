@@ -1,4 +1,4 @@
-"""Many worlds as a Gymnasium vector environment, without any Python a world."""
+"""The vector environment: many worlds in one Gymnasium VectorEnv, with no Python loop over them."""
 
 from typing import Any
 
@@ -9,8 +9,9 @@ from gymnasium.vector.utils import batch_space
 
 from physics import Fidelity
 from physics.scene.validation import choice, integer
-from rigid_envs.episodes.arguments import make_task, words
-from rigid_envs.episodes.runner import Observation, Runner, check_seed
+from rigid_envs.episodes.arguments import argument_names, make_task
+from rigid_envs.episodes.checks import KEEP_SEED, check_seed
+from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward
@@ -21,28 +22,31 @@ Array = np.ndarray
 class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     """A task in `num_envs` worlds.
 
-    World i of reset(seed=s) behaves as the single environment reset with s + i, bit for bit.
+    After `reset(seed=s)`, world i is bitwise identical to a single environment after
+    `reset(seed=s + i)`.
 
     Args:
-        task: a task's name or class, or a task.
+        task: name, class or object of a task.
         num_envs: number of worlds.
-        reward_type: "sparse": -1 or 0; "dense": shaped.
+        reward_type: "sparse" (-1 or 0) or "dense" (shaped).
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
-        render_mode: None, "rgb_array" (a frame a world) or "human" (a grid of them).
+        render_mode: None, "rgb_array" (one frame per world) or "human" (a grid of frames).
         show_forces: draw contact forces.
-        show_particles: draw what the solids touch with in place of their exact shapes.
-        render_worlds: how many worlds to draw at most: the first ones.
-        render_size: width and height of a world's picture in pixels.
-        max_episode_steps: truncate after so many steps; never if None.
-        terminate_on_success: end an episode when it is solved.
-        randomize: ranges of parameters that are drawn for each episode, as {"mass": (0.5, 2.0)}:
-            see `rigid_envs.episodes.randomization.Randomization`.
-        observe_parameters: what `randomize` names is observed too.
-        guided: what is left to do is observed too, as the task tells it from both goals. Not for
-            learners that relabel goals (HER): they would read the goal that was.
-        autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as gymnasium.vector.AutoresetMode.
-        threads: to share the worlds out over; all cores if None.
-        **arguments: of the task, as `blocks`.
+        show_particles: draw the collision samples of the solids in their outlines.
+        render_worlds: largest number of worlds to draw; the first ones are drawn.
+        render_size: width and height of a world's frame in pixels.
+        max_episode_steps: number of steps after which an episode is truncated; the task's number if
+            None, no limit if -1.
+        terminate_on_success: whether success terminates an episode.
+        autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, see gymnasium.vector.AutoresetMode.
+        threads: number of threads among which the worlds are divided; all cores if None.
+        randomize: ranges of parameters that are drawn for each episode, such as
+            {"mass": (0.5, 2.0)}; see `rigid_envs.episodes.randomization.Randomization`.
+        observe_parameters: append the drawn parameters to the observation.
+        observe_task_guide: append the task's guide to the observation: what is left to do, computed
+            from both goals. Do not use it with learners that relabel goals (HER): the guide would
+            still show the original goal.
+        **arguments: arguments of the task, such as `blocks`.
     """
 
     metadata: dict[str, Any] = {
@@ -62,22 +66,22 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         show_particles: bool = False,
         render_worlds: int = 16,
         render_size: int = 480,
-        max_episode_steps: int | None = 50,
+        max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         randomize: Any = None,
         observe_parameters: bool = False,
-        guided: bool = False,
+        observe_task_guide: bool = False,
         **arguments: Any,
     ) -> None:
-        """Builds the worlds; episodes begin with `reset`."""
+        """Builds the worlds. Call `reset` to start episodes."""
         self.num_envs = integer("num_envs", num_envs, low=1)
         self.render_mode = render_mode
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
         self._runner = Runner(
-            make_task(task, arguments, words(RigidVectorEnv)),
+            make_task(task, arguments, argument_names(RigidVectorEnv)),
             self.num_envs,
             reward_type,
             fidelity,
@@ -86,7 +90,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             terminate_on_success,
             randomize,
             observe_parameters,
-            guided,
+            observe_task_guide,
         )
         self._pictures = Pictures(
             self._runner, render_mode, show_forces, show_particles, render_worlds, render_size
@@ -97,23 +101,37 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
+    @property
+    def task(self) -> Task:
+        """The task."""
+        return self._runner.task
+
     def reset(
         self,
         *,
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts episodes in all worlds, or in those of options["reset_mask"] [num_envs].
+        """Starts episodes in all worlds, or in some of them.
 
-        options["randomize"] gives these worlds other ranges from now on; None, the constructor's.
+        Args:
+            seed: an integer s gives world i the seed s + i. A list gives each world its own seed;
+                where it is None, and in all worlds if seed is None, the world starts its next
+                episode. A world that has never had a seed draws one.
+            options: {"reset_mask": [num_envs] bool} selects the worlds to reset.
+                {"randomize": ranges} replaces their ranges from this episode on; None restores
+                those of the constructor.
 
         Raises:
-            TypeError, ValueError: a bad seed, an unknown option, a mask of the wrong shape.
+            TypeError, ValueError: an invalid seed, an unknown option, or an invalid mask. No state
+                has changed then.
         """
         mask, seeds = self._reset_mask(options), self._seeds(seed)
-        super().reset(seed=None if seeds is None else int(seeds[0]))
-        if seeds is None and not self._runner.seeded:
-            seeds = self._seeds(int(self.np_random.integers(2**31)))
+        super().reset(seed=None if seeds[0] == KEEP_SEED else int(seeds[0]))
+        missing = self._runner.unseeded & (seeds == KEEP_SEED)
+        if (missing & mask).any():
+            fresh = int(self.np_random.integers(2**31)) + np.arange(self.num_envs)
+            seeds = np.where(missing, fresh, seeds)
         self._runner.reset(mask, seeds, options)
         self._ended &= ~mask
         observation, info = self._runner.observe()
@@ -125,35 +143,40 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         options.pop("randomize", None)
         if options:
             raise ValueError(
-                f'options knows only "reset_mask" and "randomize", got {sorted(options)}'
+                f'options accepts only "reset_mask" and "randomize", got {sorted(options)}'
             )
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
         mask = np.asarray(mask)
         if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(
-                f"reset_mask must be bools of shape ({self.num_envs},) with one true at least, "
+                f"reset_mask must be bools of shape ({self.num_envs},), at least one of them True, "
                 f"got {mask.dtype} of shape {mask.shape}"
             )
         return mask
 
-    def _seeds(self, seed: int | list[int | None] | None) -> Array | None:
+    def _seeds(self, seed: int | list[int | None] | None) -> Array:
+        """Seeds [num_envs]; KEEP_SEED where none is given."""
         if seed is None:
-            return None
+            return np.full(self.num_envs, KEEP_SEED)
         if isinstance(seed, int | np.integer):
             return check_seed("seed", seed) + np.arange(self.num_envs)
         if not isinstance(seed, list | tuple | np.ndarray) or len(seed) != self.num_envs:
-            raise ValueError(f"seed must be an int or {self.num_envs} of them, got {seed!r}")
-        return np.array([check_seed(f"seed[{i}]", s) for i, s in enumerate(seed)])
+            raise ValueError(
+                f"seed must be None, an int, or a list of {self.num_envs} of them, got {seed!r}"
+            )
+        return np.array(
+            [KEEP_SEED if s is None else check_seed(f"seed[{i}]", s) for i, s in enumerate(seed)]
+        )
 
     def step(self, actions: Array) -> tuple[Observation, Array, Array, Array, dict[str, Any]]:
-        """Advances every world by a frame of 40 ms.
+        """Advances every world by one step of 40 ms.
 
         Raises:
-            ValueError: actions of the wrong shape or with NaN; the state is then as it was.
-            gymnasium.error.ResetNeeded: before the first reset; in DISABLED mode, with worlds that
-                ended and weren't reset.
-            SimulationDiverged: a world turned non-finite; the others are whole.
+            ValueError: the actions have another shape or contain NaN. No state has changed then.
+            gymnasium.error.ResetNeeded: the environment has not been reset yet; or, in DISABLED
+                mode, worlds have ended and not been reset.
+            SimulationDiverged: a world has diverged. The other worlds are unaffected.
         """
         if not self._runner.seeded:
             raise gym.error.ResetNeeded("reset() must be called before step()")
@@ -164,7 +187,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
                 'reset(options={"reset_mask": terminated | truncated}) first'
             )
         if self.autoreset_mode == AutoresetMode.NEXT_STEP:
-            # this step is the reset of the worlds that ended in the last one
+            # this step resets the worlds that ended in the last step
             observation, reward, terminated, truncated, info = self._runner.step(
                 actions, self._ended
             )
@@ -172,21 +195,20 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             return observation, reward, terminated, truncated, _with_masks(info, self.num_envs)
 
         observation, reward, terminated, truncated, info = self._runner.step(actions)
-        infos = info
         ended = terminated | truncated
         if self.autoreset_mode == AutoresetMode.DISABLED:
             self._ended = ended
-            return observation, reward, terminated, truncated, _with_masks(infos, self.num_envs)
+            return observation, reward, terminated, truncated, _with_masks(info, self.num_envs)
         final: dict[str, Any] = {}
         if ended.any():
             final = self._final(observation, info, ended)
             self._runner.reset(ended)
-            observation, infos = self._runner.observe()
-        infos = {**_with_masks(infos, self.num_envs), **final}
+            observation, info = self._runner.observe()
+        infos = {**_with_masks(info, self.num_envs), **final}
         return observation, reward, terminated, truncated, infos
 
     def _final(self, observation: Observation, info: dict[str, Array], ended: Array) -> Any:
-        """Last observations and infos of the worlds that ended, by Gymnasium's names."""
+        """Last observations and infos of the worlds that ended, with Gymnasium's names."""
         last = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
             last[i] = {name: values[i] for name, values in observation.items()}
@@ -201,23 +223,26 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
 
     @property
     def reward(self) -> Reward:
-        """How goals and raw terms make the reward; wrappers ask it when goals agree."""
+        """Threshold and weights of the reward. Reward wrappers read it."""
         return self._runner.reward
 
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
-        """The reward of goals [..., goal]; see `rigid_envs.tasks.rewards.Reward.compute`.
+        """The reward of pairs of goals; see `RigidEnv.compute_reward`."""
+        return self._runner.compute_reward(achieved_goal, desired_goal, info)
 
-        Raises:
-            ValueError: with the dense reward, other goals than those of the info's step.
-        """
-        runner = self._runner
-        return runner.reward.compute(runner.reward_type, achieved_goal, desired_goal, info)
+    def compute_terminated(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
+        """Whether a step terminates the episode; see `RigidEnv.compute_terminated`."""
+        return self._runner.compute_terminated(achieved_goal, desired_goal)
+
+    def compute_truncated(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
+        """Whether a step left the bounds; see `RigidEnv.compute_truncated`."""
+        return self._runner.compute_truncated(achieved_goal, info)
 
     def render(self) -> tuple[Array, ...] | None:
-        """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them as a grid.
+        """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them in a grid.
 
-        At most `render_worlds` are drawn. `rigid_envs.rendering.renderer.grid` makes one
-        picture of several frames.
+        At most `render_worlds` worlds are drawn. `rigid_envs.rendering.renderer.grid` tiles the
+        frames.
         """
         if self.render_mode is None:
             gym.logger.warn('render() needs gym.make_vec(..., render_mode="rgb_array") or "human"')
@@ -228,11 +253,15 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._pictures.frames()
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that the episodes hold."""
+        """The complete state of all episodes; it can be pickled."""
         return {**self._runner.get_state(), "ended": self._ended.copy()}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Takes all episodes back to what `get_state` gave, to the last bit."""
+        """Restores a state from `get_state`; the episodes then continue bitwise identically.
+
+        Raises:
+            ValueError: not such a state, or one of another scene, fidelity, count or version.
+        """
         if not isinstance(state, dict) or "ended" not in state:
             raise ValueError(f"state must come from get_state, got {state!r}")
         state = dict(state)
@@ -241,7 +270,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self._ended = np.array(ended)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Closes the window, if any."""
+        """Closes the window, if there is one."""
         self._pictures.close()
 
 
@@ -253,6 +282,6 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _with_masks(info: dict[str, Array], count: int) -> dict[str, Any]:
-    """Adds Gymnasium's masks: every entry holds for every world."""
+    """Adds Gymnasium's masks, which are true for all worlds."""
     everywhere = np.ones(count, dtype=bool)
     return {**info, **{f"_{name}": everywhere for name in info}}

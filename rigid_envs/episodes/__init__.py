@@ -1,1 +1,1 @@
-"""Episodes of a task in many worlds, without Gymnasium."""
+"""Episodes of a task: starts, steps, rewards, randomisation and saved states."""

@@ -1,4 +1,4 @@
-"""What gym.make and gym.make_vec hand on: a task with its arguments, and where a word belongs."""
+"""Builds a task from the arguments of `gym.make` or `gym.make_vec`, and explains unknown ones."""
 
 import inspect
 from collections.abc import Iterable
@@ -8,8 +8,9 @@ from typing import Any
 from physics.scene.validation import choice
 from rigid_envs.tasks import TASKS, Task
 
-# words of one kind of environment, or of what makes it, that the other doesn't have
-OF_VECTORS = (
+# arguments of one kind of environment, or of the Gymnasium function that makes it, that the other
+# kind does not have
+VECTOR_ARGUMENTS = (
     "num_envs",
     "render_worlds",
     "autoreset_mode",
@@ -18,27 +19,31 @@ OF_VECTORS = (
     "vector_kwargs",
     "wrappers",
 )
-OF_SINGLES = ("disable_env_checker",)
-_BELONGS = {
+SINGLE_ARGUMENTS = ("disable_env_checker",)
+_WHERE = {
     **dict.fromkeys(
-        OF_VECTORS,
-        "belongs to native vector environments: give it to gym.make_vec, and to no single one",
+        VECTOR_ARGUMENTS,
+        "belongs to native vector environments: pass it to gym.make_vec, not to gym.make",
     ),
-    **dict.fromkeys(OF_SINGLES, "belongs to single environments: give it to gym.make alone"),
+    **dict.fromkeys(
+        SINGLE_ARGUMENTS,
+        "belongs to single environments: pass it to gym.make, not to gym.make_vec",
+    ),
 }
 
 
 def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Task:
-    """A task from its name or class, and arguments; or the task itself.
+    """A task from its name or class and its arguments; a Task object is returned as it is.
 
     Args:
-        task: a task's name or class, or a task.
-        arguments: of its constructor; none for a task that is made already.
-        others: what whoever calls takes beside them.
+        task: name, class or object of a task.
+        arguments: arguments of the task's constructor; must be empty for a Task object.
+        others: names of the arguments that the caller has besides those of the task.
 
     Raises:
-        TypeError: an argument that the task hasn't; the message says whose it is, or what is near.
-        ValueError: no such task, or whatever its constructor refuses.
+        TypeError: the task does not have one of the arguments. The message says where the argument
+            belongs, or which known argument is spelled like it.
+        ValueError: there is no such task, or its constructor raised this error.
     """
     known: list[str] = []
     if not isinstance(task, Task):
@@ -49,17 +54,18 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
     for argument in arguments:
         if argument in known:
             continue
-        if argument in _BELONGS:
-            raise TypeError(f"argument {argument!r} {_BELONGS[argument]}")
+        if argument in _WHERE:
+            raise TypeError(f"argument {argument!r} {_WHERE[argument]}")
         near = get_close_matches(argument, [*known, *others], 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise TypeError(
-            f"unknown argument {argument!r}: of its own, {name} has {known or 'none'}{hint}"
-        )
+        accepted = f"{name} accepts {known or 'no arguments'}"
+        if isinstance(task, Task):
+            accepted = f"task is a {name} object, which accepts no further arguments"
+        raise TypeError(f"unknown argument {argument!r}: {accepted}{hint}")
     return task if isinstance(task, Task) else task(**arguments)
 
 
-def words(kind: type) -> list[str]:
-    """Names of the arguments that a class's constructor spells out."""
-    spread = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-    return [n for n, p in inspect.signature(kind).parameters.items() if p.kind not in spread]
+def argument_names(kind: type) -> list[str]:
+    """Names of the arguments in the signature of a class's constructor, without *args, **kwargs."""
+    variable = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+    return [n for n, p in inspect.signature(kind).parameters.items() if p.kind not in variable]

@@ -1,4 +1,4 @@
-"""What of an observation lies within its bounds: one pass over all worlds."""
+"""Clips observations to their bounds, in one pass over all worlds."""
 
 from functools import cache
 from typing import Any
@@ -22,7 +22,7 @@ def _make_clip() -> Any:
         for c in range(columns.shape[0]):
             column, least, most = columns[c], low[c], high[c]
             beyond = 0
-            for i in range(count):  # without a branch: most columns need no more than this
+            for i in range(count):  # without a branch; most columns need only this loop
                 beyond += (column[i] < least) | (column[i] > most)
             if beyond > 0:
                 for i in range(count):
@@ -35,16 +35,16 @@ def _make_clip() -> Any:
 
 
 def clip(columns: Array, low: Array, high: Array, count: int) -> Array:
-    """Clips columns to their bounds, in place; NaN stays.
+    """Clips columns to their bounds in place; NaN stays NaN.
 
     Args:
         columns: [n, count or more] float32, C-contiguous.
         low: [n] float32.
-        high: likewise.
+        high: [n] float32.
         count: number of worlds.
 
     Returns:
-        whether [count] anything of a world was clipped.
+        [count] bool, whether any component of a world was clipped.
     """
     outside = np.empty(count, dtype=bool)
     _make_clip()(columns, low, high, outside)

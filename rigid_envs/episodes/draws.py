@@ -1,7 +1,7 @@
-"""Random numbers by counter: a draw depends on (seed, episode, index) and on nothing else.
+"""Counter-based random numbers: each depends only on seed, episode, stream and index.
 
-So a world's episodes are the same whatever its neighbours do, and thousands are drawn at once.
-The generator is splitmix64 (Steele, Lea and Flood 2014), used as a hash of the three counters.
+So the episodes of a world do not depend on the other worlds, and thousands of starts are drawn at
+once. The generator is splitmix64 (Steele, Lea and Flood 2014), used as a hash of the counters.
 """
 
 import numpy as np
@@ -9,25 +9,25 @@ import numpy as np
 Array = np.ndarray
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-# of the streams beside the first; odd as the other, and any number
+# multiplier of the streams other than 0: any odd number other than _GOLDEN
 _STREAM = np.uint64(0xD1B54A32D192ED03)
 
 
 def _mix(x: Array) -> Array:
-    """splitmix64's finaliser: every bit of the input changes half the bits of the output."""
+    """Finaliser of splitmix64: each bit of the input changes half of the output bits on average."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))
 
 
 def uniform(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:
-    """Uniform numbers in [0, 1[.
+    """Uniform random numbers in [0, 1).
 
     Args:
         seeds: [n] non-negative integers.
         episodes: [n] non-negative integers.
-        count: draws to each.
-        stream: one of many sequences that have nothing to do with each other, or [n] of them.
+        count: how many numbers to draw for each seed and episode.
+        stream: number of an independent sequence, or [n] of them.
 
     Returns:
         [n, count]
@@ -43,14 +43,14 @@ def uniform(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) 
 
 
 def normal(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:
-    """Gaussian numbers [n, count] of mean 0 and deviation 1, from pairs of `uniform` (Box-Muller).
+    """Gaussian random numbers [n, count] with mean 0 and standard deviation 1 (Box-Muller).
 
     Args:
         seeds: [n] non-negative integers.
         episodes: [n] non-negative integers.
-        count: draws to each.
+        count: how many numbers to draw for each seed and episode.
         stream: see `uniform`.
     """
     draws = uniform(seeds, episodes, 2 * count, stream)
-    size = np.sqrt(-2.0 * np.log1p(-draws[:, :count]))
-    return np.asarray(size * np.cos(2.0 * np.pi * draws[:, count:]))
+    radius = np.sqrt(-2.0 * np.log1p(-draws[:, :count]))
+    return np.asarray(radius * np.cos(2.0 * np.pi * draws[:, count:]))

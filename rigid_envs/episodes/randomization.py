@@ -1,8 +1,8 @@
-"""Randomisation: what differs from episode to episode beside starts and goals.
+"""Randomisation: parameters of bodies and control noise that are drawn for each episode.
 
-Every body has a mass, friction, restitution and size of its own in each episode, drawn evenly from
-ranges, and so has the noise of the controls. Draws are counters hashed, as starts are: a world's
-depend on its seed and episode alone.
+In each episode, every body gets its own mass, friction, restitution and size, drawn uniformly from
+ranges, and the world its own standard deviation of control noise. The draws are counter-based, as
+those of starts are: they depend only on a world's seed and episode.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,54 +15,59 @@ from physics.scene.validation import choice, number
 from rigid_envs.episodes.draws import normal, uniform
 
 Array = np.ndarray
+Ranges = dict[str, tuple[float, float]]
 
 NOISE = "noise"
-# name, unit, and the factor's base: mass and size are factors of the scene's own
 NAMES = (*Parameters._fields, NOISE)
-FACTORS = ("mass", "size")
-# streams of draws: starts have 0, and the noise of step k has NOISE_STREAM + k
-_STREAM, _NOISE_STREAM = 1, 2
+FACTORS = ("mass", "size")  # given as factors of the values in the scene
+# streams of random numbers: starts use 0, and the noise of step k uses _NOISE_STREAM + k
+_PARAMETER_STREAM, _NOISE_STREAM = 1, 2
 
 
 class Randomization:
-    """Ranges and draws of `count` worlds; each world may have ranges of its own.
+    """Ranges and drawn values of `count` worlds; each world may have its own ranges.
 
     Args:
-        scene: what is in each world.
-        count: of worlds.
-        ranges: by name, (low, high) or a number: "mass" and "size" as factors of the scene's,
-            "friction" and "restitution" of the bodies' material, and "noise", the standard
-            deviation of what is added to each component of an action. What isn't named is as in
-            the scene, and no noise.
-        sizes: least and largest factor of sizes that the task takes; None if it takes no other.
+        scene: what each world contains.
+        count: number of worlds.
+        ranges: (low, high) or a number by name. "mass" and "size" are factors of the values in the
+            scene, "friction" and "restitution" are values of the bodies' material, and "noise" is
+            the standard deviation of what is added to each component of an action. What `ranges`
+            does not name keeps its value from the scene, and there is no noise.
+        size_range: smallest and largest factor of sizes that the task supports; None if it supports
+            only the sizes of the scene.
 
     Raises:
-        TypeError, ValueError: an unknown name, or no such range.
+        TypeError, ValueError: an unknown name, or an invalid range.
     """
 
     def __init__(
-        self, scene: Scene, count: int, ranges: Any, sizes: tuple[float, float] | None
+        self, scene: Scene, count: int, ranges: Any, size_range: tuple[float, float] | None
     ) -> None:
-        """Draws nothing yet: all worlds are as in the scene."""
-        self._own = Parameters.of(scene)
-        self._bodies, self._sizes = len(scene.bodies), sizes
-        given = self.check(ranges)
-        self.names = tuple(name for name in NAMES if name in given)
-        self._default = self._row(given)
+        """Draws nothing yet: all worlds have the values of the scene."""
+        self._scene_values = Parameters.of(scene)
+        self._bodies, self._size_range = len(scene.bodies), size_range
+        checked = self.check(ranges)
+        self.names = tuple(name for name in NAMES if name in checked)
+        self._default = self._limits(checked)
         self._ranges = np.tile(self._default, (count, 1, 1))
-        own = np.concatenate([*(values[0] for values in self._own), [0.0]])
-        self._drawn = np.tile(own, (count, 1))
+        values = np.concatenate([*(values[0] for values in self._scene_values), [0.0]])
+        self._drawn = np.tile(values, (count, 1))
         self._observed = [
             column for column, (name, _) in enumerate(self._columns()) if name in self.names
         ]
 
     def _columns(self) -> list[tuple[str, str]]:
-        """Name of a parameter, and what it is of, for every column of the draws."""
+        """Name and description of the parameter in each column of the drawn values."""
         bodies = [(name, f"body {i} {name}") for name in NAMES[:-1] for i in range(self._bodies)]
         return [*bodies, (NOISE, "control noise")]
 
-    def check(self, ranges: Any) -> dict[str, tuple[float, float]]:
-        """Ranges by name, (low, high) each."""
+    def check(self, ranges: Any) -> Ranges:
+        """Ranges as (low, high) by name.
+
+        Raises:
+            TypeError, ValueError: an unknown name, or an invalid range.
+        """
         if ranges is None:
             return {}
         if not isinstance(ranges, Mapping):
@@ -93,81 +98,92 @@ class Randomization:
         return checked
 
     def _check_sizes(self, field: str, ends: tuple[float, float]) -> None:
-        """Refuses sizes that the task isn't laid out for."""
-        if self._sizes is None:
-            raise ValueError(f"{field}: this task is laid out for bodies of one size, leave it out")
-        least, most = self._sizes
+        """Raises ValueError for sizes that the task does not support."""
+        if self._size_range is None:
+            raise ValueError(f"{field}: this task supports only the sizes of its scene; remove it")
+        least, most = self._size_range
         if ends[0] < least or ends[1] > most:
             limits = f"within {least:g} and {most:g}" if least > 0.0 else f"at most {most:g}"
             raise ValueError(f"{field} must be {limits} in this task, got {ends}")
 
-    def _row(self, ranges: Mapping[str, tuple[float, float]]) -> Array:
-        """[columns, 2] low and high of every draw."""
+    def _limits(self, ranges: Mapping[str, tuple[float, float]]) -> Array:
+        """Low and high [columns, 2] of each column of the drawn values."""
         ends = []
         for which in (0, 1):
             columns = [
-                np.zeros(self._bodies) + ranges[name][which] * (own[0] if name in FACTORS else 1.0)
+                np.zeros(self._bodies)
+                + ranges[name][which] * (values[0] if name in FACTORS else 1.0)
                 if name in ranges
-                else own[0]
-                for name, own in zip(NAMES[:-1], self._own, strict=True)
+                else values[0]
+                for name, values in zip(NAMES[:-1], self._scene_values, strict=True)
             ]
             noise = ranges[NOISE][which] if NOISE in ranges else 0.0
             ends.append(np.concatenate([*columns, [noise]]))
         return np.stack(ends, axis=-1)
 
     def _split(self, columns: Array) -> dict[str, Array]:
-        """[n, bodies] of each parameter, by name, from [n, columns]."""
+        """Values [n, bodies] of each parameter by name, from columns [n, columns]."""
         parts = np.split(columns[:, :-1], len(NAMES) - 1, axis=1) if self._bodies else []
         return dict(zip(NAMES[:-1], parts, strict=False))
 
-    def needs_varied(self, ranges: Mapping[str, Any]) -> bool:
-        """Whether worlds come to differ in more than noise."""
+    def needs_per_world_parameters(self, ranges: Mapping[str, Any]) -> bool:
+        """Whether these ranges randomise anything other than the control noise."""
         return any(name != NOISE for name in ranges)
 
     def check_step(self, world: World, ranges: Mapping[str, tuple[float, float]]) -> None:
-        """Refuses ranges that the step of a varied world is too long for."""
-        low, high = (self._split(end[None]) for end in np.moveaxis(self._row(ranges), -1, 0))
+        """Raises ValueError for ranges in which the time step would not be stable."""
+        low, high = (self._split(end[None]) for end in np.moveaxis(self._limits(ranges), -1, 0))
         world.check_parameters({name: (low[name][0], high[name][0]) for name in low})
 
     def set_ranges(self, mask: Array, ranges: Mapping[str, tuple[float, float]] | None) -> None:
-        """Gives the worlds of a mask other ranges; the first ones if None."""
-        self._ranges[mask] = self._default if ranges is None else self._row(ranges)
+        """Sets the ranges of the worlds of the mask; None restores those of the constructor."""
+        self._ranges[mask] = self._default if ranges is None else self._limits(ranges)
 
     def check_observed(self, ranges: Mapping[str, tuple[float, float]]) -> None:
-        """Refuses ranges that go beyond the first ones: these bound what is observed."""
-        row = self._row(ranges)
+        """Raises ValueError for ranges outside those of the constructor.
+
+        Those are the bounds of the observation.
+        """
+        limits = self._limits(ranges)
         for column in self._observed:
-            (low, high), (least, most) = row[column], self._default[column]
+            (low, high), (least, most) = limits[column], self._default[column]
             if low < least or high > most:
                 name, what = self._columns()[column]
                 raise ValueError(
-                    f"randomize[{name!r}] in options must stay within the environment's own, which "
-                    f"bounds the observation: {what} would be within {low:g} and {high:g}, not "
-                    f"{least:g} and {most:g}"
+                    f"randomize[{name!r}] in options must stay within the range that the "
+                    f"environment was made with, which bounds the observation: {what} is bounded "
+                    f"by {least:g} and {most:g}, got {low:g} to {high:g}"
                 )
 
     def draw(self, world: World, mask: Array, seeds: Array, episodes: Array) -> None:
-        """Draws for the episodes [chosen] of the worlds of a mask, and writes what is drawn."""
+        """Draws values for the worlds of the mask and writes them to `world`.
+
+        Args:
+            world: the worlds.
+            mask: [count] bool; n of its entries are true.
+            seeds: [n] seeds of these worlds.
+            episodes: [n] numbers of their episodes.
+        """
         ranges = self._ranges[mask]
-        draws = uniform(seeds, episodes, ranges.shape[1], _STREAM)
+        draws = uniform(seeds, episodes, ranges.shape[1], _PARAMETER_STREAM)
         drawn = ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * draws
-        self._drawn[mask] = np.minimum(drawn, ranges[..., 1])  # which round-off might pass
+        self._drawn[mask] = np.minimum(drawn, ranges[..., 1])  # round-off might exceed it
         if world.features.varied:
             world.set_parameters(**self._split(self._drawn[mask]), worlds=mask)
 
     @property
-    def noisy(self) -> bool:
-        """Whether any world's controls have noise."""
+    def has_noise(self) -> bool:
+        """Whether the controls of any world have noise."""
         return bool(self._drawn[:, -1].any())
 
-    def disturb(self, actions: Array, seeds: Array, episodes: Array, steps: Array) -> Array:
+    def add_noise(self, actions: Array, seeds: Array, episodes: Array, steps: Array) -> Array:
         """Actions [count, actions] with the noise of each world's step [count]."""
-        found = normal(seeds, episodes, actions.shape[1], _NOISE_STREAM + steps)
-        return np.clip(actions + self._drawn[:, -1:] * found, -1.0, 1.0)
+        noise = normal(seeds, episodes, actions.shape[1], _NOISE_STREAM + steps)
+        return np.clip(actions + self._drawn[:, -1:] * noise, -1.0, 1.0)
 
     @property
     def bounds(self) -> tuple[tuple[str, str, float, float], ...]:
-        """Name, unit, low and high of what can be observed, as a task's bounds."""
+        """(name, unit, low, high) of each value that can be observed, as in a task's bounds."""
         columns, found = self._columns(), []
         for column in self._observed:
             name, what = columns[column]
@@ -177,13 +193,13 @@ class Randomization:
 
     @property
     def observed(self) -> Array:
-        """[count, n] what was drawn of what `bounds` names."""
+        """Drawn values [count, n] of what `bounds` names."""
         return self._drawn[:, self._observed]
 
     def get_state(self) -> dict[str, Array]:
-        """Ranges and draws of all worlds."""
+        """Ranges and drawn values of all worlds."""
         return {"ranges": self._ranges.copy(), "drawn": self._drawn.copy()}
 
     def set_state(self, state: Mapping[str, Array]) -> None:
-        """Takes ranges and draws back to what `get_state` gave."""
+        """Restores ranges and drawn values from `get_state`."""
         self._ranges[:], self._drawn[:] = state["ranges"], state["drawn"]

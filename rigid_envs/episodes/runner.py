@@ -1,6 +1,7 @@
-"""The runner: a task on a world of any count. Both kinds of environment are thin adapters to it."""
+"""The runner: episodes of a task in any number of worlds. Both environments are built on it."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,32 +9,32 @@ from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Snapshot, World
 from physics.jit import columns
-from physics.scene.validation import choice, instance, integer
-from rigid_envs.episodes.arguments import make_task, words
+from physics.scene.validation import choice, instance
+from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.bounds import clip
+from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.draws import uniform
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.goals import distance
-from rigid_envs.tasks.rewards import GOALS_OF_TERMS, REWARD_TYPES, goals_of_terms
+from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, join_goals
 
 Array = np.ndarray
 Observation = dict[str, Array]
 
 STATE_VERSION = 2
-# so that a seed plus a world's index is an int64 too
-LARGEST_SEED = 2**62
 
 
 class Step(NamedTuple):
-    """What a step of all worlds gives.
+    """The result of one step of all worlds.
 
     Attributes:
-        observation: dict of [count, ...] float32.
+        observation: dict of arrays [count, ...] float32.
         reward: [count].
-        terminated, truncated: [count] bool.
-        info: dict of [count] arrays, or [count, n].
+        terminated: [count] bool.
+        truncated: [count] bool.
+        info: dict of arrays [count] or [count, n].
     """
 
     observation: Observation
@@ -47,17 +48,18 @@ class Runner:
     """Episodes of a task in `count` worlds.
 
     Args:
-        task: a task's name or class, or a task.
+        task: name, class or object of a task.
         count: number of worlds.
         reward_type: "sparse" or "dense".
-        fidelity: of the physics.
-        threads: to share the worlds out over; all cores if None.
-        max_episode_steps: truncate after so many steps; never if None.
-        terminate_on_success: end an episode when it is solved.
+        fidelity: name of a preset, or a physics.Fidelity.
+        threads: number of threads among which the worlds are divided; all cores if None.
+        max_episode_steps: number of steps after which an episode is truncated; the task's number if
+            None, no limit if -1.
+        terminate_on_success: whether success terminates an episode.
         randomize: ranges of parameters that are drawn for each episode, see `Randomization`.
-        observe_parameters: what `randomize` names is observed too.
-        guided: what the task's `guide` writes is observed too.
-        **arguments: of the task, where it is given by its name or class.
+        observe_parameters: append the drawn parameters to the observation.
+        observe_task_guide: append the task's guide to the observation, see `Task.guide`.
+        **arguments: arguments of the task, if it is given by name or class.
     """
 
     def __init__(
@@ -71,39 +73,38 @@ class Runner:
         terminate_on_success: bool = False,
         randomize: Any = None,
         observe_parameters: bool = False,
-        guided: bool = False,
+        observe_task_guide: bool = False,
         **arguments: Any,
     ) -> None:
-        """Builds the world; episodes begin with `reset`."""
-        self.task = make_task(task, arguments, words(Runner))
+        """Builds the worlds. Call `reset` to start episodes."""
+        self.task = make_task(task, arguments, argument_names(Runner))
         self.reward_type = choice("reward_type", reward_type, REWARD_TYPES)
         scene = self.task.scene()
-        self.randomization = Randomization(scene, count, randomize, self.task.sizes)
+        self.randomization = Randomization(scene, count, randomize, self.task.size_range)
         ranges = self.randomization.check(randomize)
-        varied = self.randomization.needs_varied(ranges)
-        self.world = World(scene, fidelity, count, threads, varied=varied)
-        if varied:
+        per_world = self.randomization.needs_per_world_parameters(ranges)
+        self.world = World(scene, fidelity, count, threads, varied=per_world)
+        if per_world:
             self.randomization.check_step(self.world, ranges)
         self.count = count
-        if max_episode_steps is not None:
-            max_episode_steps = integer("max_episode_steps", max_episode_steps, low=1)
-        self.max_episode_steps = max_episode_steps
+        self.max_episode_steps = step_limit(self.task, max_episode_steps)
         if not isinstance(terminate_on_success, bool | np.bool_):
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
         reward = self.task.reward
-        self.reward = reward.ending() if self.terminate_on_success else reward
+        self.reward = reward.with_time_penalty() if self.terminate_on_success else reward
 
         self.observe_parameters: bool = instance("observe_parameters", observe_parameters, bool)
         if self.observe_parameters and not self.randomization.bounds:
             raise ValueError(
-                "observe_parameters needs randomize, whose ranges bound what is observed"
+                "observe_parameters needs randomize: its ranges are the bounds of the observed "
+                "parameters"
             )
-        seen = self.randomization.bounds if self.observe_parameters else ()
-        self.guided: bool = instance("guided", guided, bool)
-        # last, so that indices hold
-        guides = self.task.guides if self.guided else ()
-        self.bounds = (*self.task.bounds, *seen, *guides)
+        parameter_bounds = self.randomization.bounds if self.observe_parameters else ()
+        self.observe_task_guide: bool = instance("observe_task_guide", observe_task_guide, bool)
+        guide_bounds = self.task.guide_bounds if self.observe_task_guide else ()
+        # options append components, so that the indices of the others do not change
+        self.bounds = (*self.task.bounds, *parameter_bounds, *guide_bounds)
         low, high = _limits(self.bounds)
         goal_low, goal_high = _limits(self.task.goal_bounds)
         self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
@@ -122,59 +123,63 @@ class Runner:
         self._seeded = self._observed = False
         self._elapsed = np.zeros(count, dtype=np.int64)
         self._now = self.world.read()
-        self._apart = np.zeros(count)
+        self._goal_distance = np.zeros(count)
         self._goals = np.zeros((count, len(goal_low)), dtype=np.float32, order="F")
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
     ) -> None:
-        """Starts an episode in the worlds of the mask [count]: their next, or a seed's first.
+        """Starts an episode in the worlds of the mask: their next one, or the first one of a seed.
 
         Args:
             mask: [count] bool.
-            seeds: [count] non-negative; a world without a seed so far needs one.
-            options: "randomize": ranges for these worlds from now on, in place of the runner's; its
-                own again if None.
+            seeds: [count] integers, KEEP_SEED where a world starts its next episode; None if all
+                do. A world without a seed needs one.
+            options: {"randomize": ranges} for these worlds from this episode on; None restores the
+                ranges of the constructor.
 
         Raises:
-            TypeError, ValueError: bad ranges, or such that the step is too long for; nothing has
-                changed then.
+            TypeError, ValueError: invalid ranges, or ranges in which the time step would not be
+                stable. No state has changed then.
         """
         if options and "randomize" in options:
             self._randomize(mask, options["randomize"])
         if seeds is not None:
-            self._seeds[mask] = seeds[mask]
-            self._episodes[mask] = -1
+            given = mask & (seeds != KEEP_SEED)
+            self._seeds[given] = seeds[given]
+            self._episodes[given] = -1
         self._episodes[mask] += 1
         self._seeded = bool(np.all(self._episodes >= 0))
         self._elapsed[mask] = 0
         self.randomization.draw(self.world, mask, self._seeds[mask], self._episodes[mask])
-        draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draws)
+        draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draw_count)
         goals = self.task.start(self.world, mask, draws)
         self._goals[mask] = check_goals(self.task, "start", goals, len(draws))
         self._now = self.world.read()
 
     def _randomize(self, mask: Array, randomize: Any) -> None:
-        """Gives the worlds of a mask ranges of their own."""
+        """Gives the worlds of the mask their own ranges."""
         if randomize is None:
             self.randomization.set_ranges(mask, None)
             return
         ranges = self.randomization.check(randomize)
         if self.observe_parameters:
             self.randomization.check_observed(ranges)
-        if self.randomization.needs_varied(ranges):
-            self._vary()
+        if self.randomization.needs_per_world_parameters(ranges):
+            self._use_per_world_parameters()
             self.randomization.check_step(self.world, ranges)
         self.randomization.set_ranges(mask, ranges)
 
-    def _vary(self) -> None:
-        """Lets worlds differ that were built alike; they carry on as they are, to the last bit."""
-        alike = self.world
-        if not alike.features.varied:
-            count = self.count
-            self.world = World(alike.scene, alike.fidelity, count, alike.threads, varied=True)
-            own = Parameters.of(alike.scene, count)
-            self.world.restore(alike.snapshot()._replace(parameters=own))
+    def _use_per_world_parameters(self) -> None:
+        """Replaces identical worlds by worlds with per-world parameters, in the same state.
+
+        Running episodes continue bitwise identically.
+        """
+        old = self.world
+        if not old.features.varied:
+            self.world = World(old.scene, old.fidelity, self.count, old.threads, varied=True)
+            parameters = Parameters.of(old.scene, self.count)
+            self.world.restore(old.snapshot()._replace(parameters=parameters))
 
     @property
     def seeded(self) -> bool:
@@ -182,44 +187,53 @@ class Runner:
         return self._seeded
 
     @property
+    def unseeded(self) -> Array:
+        """[count] bool, the worlds that have never been reset."""
+        return self._episodes < 0
+
+    @property
     def goals(self) -> Array:
         """Desired goals [count, goal]."""
         return self._goals
 
     def observe(self) -> tuple[Observation, dict[str, Array]]:
-        """Observation, and what is told beside it: info, [count] each.
+        """Observation, and info with entries [count].
 
-        With a dense reward, info["goals_of_terms"] [count, 2 goal] has the goals that the terms
-        hold for, so that `compute_reward` can tell others.
+        With a dense reward, info["step_goals"] [count, 2 goal] holds the achieved and the desired
+        goals for which the reward terms were computed. `compute_reward` compares them with the
+        goals that it gets.
         """
-        now, split, seen = self._now, len(self.bounds), len(self.task.bounds)
-        told = split - len(self.task.guides) if self.guided else split
+        now, goal_start, task_end = self._now, len(self.bounds), len(self.task.bounds)
+        guide_start = goal_start
+        if self.observe_task_guide:
+            guide_start -= len(self.task.guide_bounds)
         table = columns((len(self._low),), self.count, np.float32)
         values = table.T[: self.count]
         if not self._observed:
             table[...] = np.nan
-        self.task.observe(self.world, now, values[:, :seen])
+        self.task.observe(self.world, now, values[:, :task_end])
         if not self._observed:
-            check_written(self.task, "observe", self.task.bounds, values[:, :seen])
+            check_written(self.task, "observe", self.task.bounds, values[:, :task_end])
         if self.observe_parameters:
-            values[:, seen:told] = self.randomization.observed
-        achieved, desired = values[:, split:], self._goals
-        reached = self.task.achieved(self.world, now)
-        achieved[...] = check_goals(self.task, "achieved", reached, self.count)
-        if self.guided:
-            self.task.guide(self.world, now, achieved, desired, values[:, told:split])
+            values[:, task_end:guide_start] = self.randomization.observed
+        achieved, desired = values[:, goal_start:], self._goals
+        goals = self.task.achieved(self.world, now)
+        achieved[...] = check_goals(self.task, "achieved", goals, self.count)
+        if self.observe_task_guide:
+            guide = values[:, guide_start:goal_start]
+            self.task.guide(self.world, now, achieved, desired, guide)
             if not self._observed:
-                check_written(self.task, "guide", self.task.guides, values[:, told:split])
+                check_written(self.task, "guide", self.task.guide_bounds, guide)
         outside = clip(table, self._low, self._high, self.count)
-        self._apart = distance(achieved, desired)
-        # as users expect them, a row for each world
+        self._goal_distance = distance(achieved, desired)
+        # one row per world, as users expect
         observation = {
-            "observation": values[:, :split].copy(),
+            "observation": values[:, :goal_start].copy(),
             "achieved_goal": achieved.copy(),
             "desired_goal": desired.copy(),
         }
-        success: Array = self.reward.success(self._apart)
-        terms = self.task.terms(self.world, now, achieved, desired, self._apart)
+        success: Array = self.reward.success(self._goal_distance)
+        terms = self.task.terms(self.world, now, achieved, desired, self._goal_distance)
         if not self._observed:
             check_terms(self.task, terms, self.count)
         self._observed = True
@@ -229,15 +243,15 @@ class Runner:
             "out_of_bounds": outside,
             **terms,
         }
-        if self.reward_type == "dense" and self.reward.of_task:
-            info[GOALS_OF_TERMS] = goals_of_terms(achieved, desired)
+        if self.reward_type == "dense" and self.reward.task_terms:
+            info[STEP_GOALS] = join_goals(achieved, desired)
         return observation, info
 
     def check_actions(self, actions: Any) -> Array:
-        """Actions [count, actions] within [-1, 1].
+        """Actions [count, actions], clipped to [-1, 1].
 
         Raises:
-            ValueError: a wrong shape, or NaN; nothing has moved then.
+            ValueError: the actions have another shape or contain NaN.
         """
         shape = (self.count, len(self.task.actions))
         try:
@@ -247,7 +261,7 @@ class Runner:
         if array.shape != shape:
             raise ValueError(f"action must have shape {shape}, got {array.shape}")
         clipped = np.minimum(np.maximum(array, -1.0), 1.0)  # NaN stays NaN
-        if math.isnan(np.add.reduce(clipped, axis=None)):  # quicker than to look at every number
+        if math.isnan(np.add.reduce(clipped, axis=None)):  # faster than checking every number
             world, component = (int(i) for i in np.argwhere(np.isnan(array))[0])
             raise ValueError(
                 f"action must be numbers within [-1, 1], got NaN in world {world}, component "
@@ -255,38 +269,39 @@ class Runner:
             )
         return clipped
 
-    def step(self, actions: Any, begun: Array | None = None) -> Step:
-        """Advances every world by a frame, or starts an episode in it.
+    def step(self, actions: Any, reset_mask: Array | None = None) -> Step:
+        """Advances every world by one step, or starts the next episode in it.
 
         Args:
             actions: [count, actions] within [-1, 1].
-            begun: mask [count] of the worlds that start their next episode in place of a frame.
+            reset_mask: [count] bool, the worlds that start their next episode instead of advancing.
+                Their reward is 0.
 
         Raises:
-            ValueError: see `check_actions`.
-            SimulationDiverged: a world turned non-finite; the others are whole.
+            ValueError: invalid actions, see `check_actions`. No state has changed then.
+            SimulationDiverged: a world has diverged. The other worlds are unaffected.
         """
         commands = self.check_actions(actions)
-        if self.randomization.noisy:
-            commands = self.randomization.disturb(
+        if self.randomization.has_noise:
+            commands = self.randomization.add_noise(
                 commands, self._seeds, self._episodes, self._elapsed
             )
         self.task.act(self.world, self._now, commands)
-        if begun is None or not begun.any():
-            begun = None
-        # first, as the other worlds advance even if one of them diverges
+        if reset_mask is None or not reset_mask.any():
+            reset_mask = None
+        # before advancing: if one world diverges, the others have advanced all the same
         self._elapsed += 1
         try:
-            self.world.advance(self.task.frame, None if begun is None else ~begun)
+            self.world.advance(self.task.frame, None if reset_mask is None else ~reset_mask)
         finally:
             self._now = self.world.read()
-        if begun is not None:
-            self.reset(begun)
+        if reset_mask is not None:
+            self.reset(reset_mask)
         observation, info = self.observe()
         if self.reward_type == "sparse":
             rewards = self.reward.sparse(info["is_success"])
         else:
-            rewards = self.reward.dense(info["is_success"], self._apart, info)
+            rewards = self.reward.dense(info["is_success"], self._goal_distance, info)
         if self.terminate_on_success:
             terminated = info["is_success"].copy()
         else:
@@ -294,13 +309,39 @@ class Runner:
         truncated = info["out_of_bounds"].copy()
         if self.max_episode_steps is not None:
             truncated = truncated | (self._elapsed >= self.max_episode_steps)
-        if begun is not None:
-            rewards[begun] = 0.0
-            terminated, truncated = terminated & ~begun, truncated & ~begun
+        if reset_mask is not None:
+            rewards[reset_mask] = 0.0
+            terminated, truncated = terminated & ~reset_mask, truncated & ~reset_mask
         return Step(observation, rewards, terminated, truncated, info)
 
+    def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Any:
+        """The reward [...] of goals [..., goal]; see `Reward.compute`."""
+        return self.reward.compute(self.reward_type, achieved, desired, info)
+
+    def compute_terminated(self, achieved: Array, desired: Array) -> Any:
+        """Whether [...] a step with these goals [..., goal] terminates the episode."""
+        success = self.reward.success(distance(achieved, desired))
+        terminated = np.logical_and(success, self.terminate_on_success)
+        return terminated if terminated.ndim else bool(terminated)
+
+    def compute_truncated(self, achieved: Array, info: Any) -> Any:
+        """Whether [...] a step was truncated because it left the bounds of the observation.
+
+        Only the info of the step shows this; without its entry "out_of_bounds" the result is False.
+        """
+        if info is None or isinstance(info, Mapping):
+            outside = np.asarray((info or {}).get("out_of_bounds", False), dtype=bool)
+        else:
+            outside = np.array([one.get("out_of_bounds", False) for one in info], dtype=bool)
+        shape = np.shape(achieved)[:-1]
+        rows = outside.reshape(outside.shape + (1,) * (len(shape) - outside.ndim))
+        return np.broadcast_to(rows, shape).copy() if shape else bool(outside)
+
     def get_state(self) -> dict[str, Any]:
-        """Everything that the episodes hold; `set_state` continues from it to the last bit."""
+        """The complete state of the episodes.
+
+        After `set_state` with it, episodes continue bitwise identically.
+        """
         return {
             "version": STATE_VERSION,
             "world": self.world.snapshot(),
@@ -312,21 +353,19 @@ class Runner:
         }
 
     def set_state(self, state: Any) -> None:
-        """Takes all episodes back to what `get_state` gave.
+        """Restores all episodes from `get_state`.
 
         Raises:
-            ValueError: not such a state, another version, or another scene, fidelity or count.
+            ValueError: not such a state; or one with another version, scene, fidelity or count.
         """
         wanted = {"version", "world", "seeds", "episodes", "elapsed", "goals", "ranges", "drawn"}
         if not isinstance(state, dict) or set(state) != wanted:
             raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
         if state["version"] != STATE_VERSION:
-            raise ValueError(
-                f"state has version {state['version']!r}, this is version {STATE_VERSION}"
-            )
+            raise ValueError(f"state must have version {STATE_VERSION}, got {state['version']!r}")
         saved = state["world"]
         if isinstance(saved, Snapshot) and saved.parameters is not None:
-            self._vary()
+            self._use_per_world_parameters()
         elif isinstance(saved, Snapshot) and self.world.features.varied:
             saved = saved._replace(parameters=Parameters.of(saved.scene, len(saved.state.world)))
         self.world.restore(saved)
@@ -337,15 +376,7 @@ class Runner:
         self._seeded = bool(np.all(self._episodes >= 0))
 
 
-def check_seed(field: str, value: Any) -> int:
-    """`value` as a seed."""
-    seed = integer(field, value, low=0)
-    if seed > LARGEST_SEED:
-        raise ValueError(f"{field} must be at most 2**62, got {value!r}")
-    return seed
-
-
 def _limits(bounds: tuple[tuple[str, str, float, float], ...]) -> tuple[Array, Array]:
-    """Low and high [n] of a task's bounds."""
+    """Low and high [n] of bounds."""
     low = np.array([b[2] for b in bounds], dtype=np.float32)
     return low, np.array([b[3] for b in bounds], dtype=np.float32)

@@ -1,7 +1,7 @@
-"""What a task of one's own gives is looked at, so that mistakes are told where they are.
+"""Checks of what a custom task returns, so that errors name the method that caused them.
 
-The shape of its goals always, which costs little; the rest at the first observation. Values of
-goals and terms are taken as they are.
+The shape of goals is checked in each step, which costs little. All other checks run once, at the
+first observation. Values of goals and terms are not checked.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,65 +10,74 @@ from typing import Any
 import numpy as np
 
 from rigid_envs.tasks import Task
-from rigid_envs.tasks.rewards import GOALS_OF_TERMS, OF_GOALS
+from rigid_envs.tasks.rewards import GOAL_TERMS, STEP_GOALS
 
 Array = np.ndarray
 
-TAKEN = (*OF_GOALS, GOALS_OF_TERMS, "is_success", "out_of_bounds")
+RESERVED_TERMS = (*GOAL_TERMS, STEP_GOALS, "is_success", "out_of_bounds")
 
 
-def check_goals(task: Task, what: str, goals: Any, count: int) -> Array:
-    """Goals [count, goal] as one of a task's methods returns them.
+def check_goals(task: Task, method: str, goals: Any, count: int) -> Array:
+    """Goals [count, goal] as returned by a method of a task.
 
     Raises:
-        ValueError: another shape.
+        ValueError: they have another shape.
     """
     shape = (count, len(task.goal_bounds))
     if np.shape(goals) != shape:
         raise ValueError(
-            f"{_method(task, what)} must return goals of shape {shape}, one row a world and one "
-            f"column for each of goal_bounds, got {_seen(goals)}"
+            f"{_name(task, method)} must return goals of shape {shape}, with one row per world and "
+            f"one column per entry of goal_bounds, got {_describe(goals)}"
         )
     return np.asarray(goals)
 
 
-def check_written(task: Task, what: str, bounds: Sequence[Any], values: Array) -> None:
-    """Raises ValueError where a task has left anything of an array [count, n] unwritten."""
+def check_written(task: Task, method: str, bounds: Sequence[Any], values: Array) -> None:
+    """Checks that a method of a task wrote all of an array [count, n] that was filled with NaN.
+
+    Raises:
+        ValueError: components are still NaN; the message names them.
+    """
     names = [bound[0] for bound in bounds]
-    left = [name for name, gap in zip(names, np.isnan(values).any(axis=0), strict=True) if gap]
-    if left:
-        raise ValueError(f"{_method(task, what)} must write all of out, it has left {left}")
+    missing = [name for name, gap in zip(names, np.isnan(values).any(axis=0), strict=True) if gap]
+    if missing:
+        raise ValueError(
+            f"{_name(task, method)} must write all components of out; NaN is left in {missing}"
+        )
 
 
 def check_terms(task: Task, terms: Any, count: int) -> None:
-    """Raises ValueError for terms that aren't arrays [count] by name, or other than they should be.
+    """Checks the reward terms of a task: a dict of arrays [count].
 
-    They have every term that the reward weighs, whatever the reward's type, and none of a name that
-    the info or the reward has already.
+    The dict must contain each term that the reward weighs, whatever the reward type, and no name
+    that the runner uses itself.
+
+    Raises:
+        ValueError: the terms are not as described.
     """
-    where = _method(task, "terms")
+    where = _name(task, "terms")
     if not isinstance(terms, Mapping):
-        raise ValueError(f"{where} must return a dict of arrays [{count}], got {_seen(terms)}")
+        raise ValueError(f"{where} must return a dict of arrays [{count}], got {_describe(terms)}")
     for name, term in terms.items():
         if np.shape(term) != (count,):
             raise ValueError(
-                f"{where} must return arrays of shape ({count},), one value a world, got "
-                f"{_seen(term)} for {name!r}"
+                f"{where} must return arrays of shape ({count},), one value per world, got "
+                f"{_describe(term)} for {name!r}"
             )
-    taken = [name for name in terms if name in TAKEN]
-    if taken:
-        raise ValueError(f"{where} must not return {taken}: the runner tells these itself")
-    missing = [name for name in task.reward.of_task if name not in terms]
+    reserved = [name for name in terms if name in RESERVED_TERMS]
+    if reserved:
+        raise ValueError(f"{where} must not return {reserved}: the runner adds these terms")
+    missing = [name for name in task.reward.task_terms if name not in terms]
     if missing:
         raise ValueError(
-            f"{where} must return every term that reward weighs, {missing} is missing from "
+            f"{where} must return all terms in reward.weights: {missing} is missing from "
             f"{list(terms)}"
         )
 
 
-def _method(task: Task, name: str) -> str:
-    return f"{type(task).__name__}.{name}"
+def _name(task: Task, method: str) -> str:
+    return f"{type(task).__name__}.{method}"
 
 
-def _seen(value: Any) -> str:
+def _describe(value: Any) -> str:
     return f"shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.80}"

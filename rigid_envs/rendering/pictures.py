@@ -91,6 +91,6 @@ class Pictures:
         arrows = scene_view.forces(runner, world, particles=particles) if self._show_forces else ()
         return renderer.frame(
             scene_view.items(runner, world, particles=particles),
-            signs=scene_view.signs(runner, world),
+            markers=scene_view.markers(runner, world),
             forces=arrows,
         )

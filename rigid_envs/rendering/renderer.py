@@ -20,8 +20,8 @@ from rigid_envs.rendering.view import (
     Goal,
     Item,
     Mark,
+    Marker,
     Particles,
-    Sign,
     ground,
 )
 from rigid_envs.rendering.window import INK, load_pygame
@@ -84,7 +84,7 @@ class Renderer:
         self,
         items: Sequence[Item],
         *,
-        signs: Sequence[Sign] = (),
+        markers: Sequence[Marker] = (),
         forces: Sequence[Arrow] = (),
         caption: str = "",
     ) -> Array:
@@ -92,24 +92,24 @@ class Renderer:
 
         Args:
             items: the solids.
-            signs: targets and marks.
+            markers: targets and marks.
             forces: arrows, drawn over everything else.
             caption: text for the top left corner.
 
         Returns:
             A new array (height, width, 3) uint8.
         """
-        goals = [sign for sign in signs if isinstance(sign, Goal)]
+        goals = [marker for marker in markers if isinstance(marker, Goal)]
         balls = [goal for goal in goals if goal.position[2] > 0.0]
-        ghosts = self._painter.ghosts([sign for sign in signs if isinstance(sign, Ghost)])
+        ghosts = self._painter.ghosts([marker for marker in markers if isinstance(marker, Ghost)])
         colors = [item.color for item in items] + [ball.color for ball in balls]
         solids = Solids(items, balls)
         self._canvas.blit(self._background, (0, 0))
         for goal in goals:
             self._draw_disc(goal)
-        for sign in signs:
-            if isinstance(sign, Mark):
-                self._draw_mark(sign)
+        for marker in markers:
+            if isinstance(marker, Mark):
+                self._draw_mark(marker)
         self._draw_shadows(*solids.outlines(ACROSS_LIGHT, len(items)))
         for color, faces in ghosts:
             self._painter.glass(color, faces, GHOST_FILL)

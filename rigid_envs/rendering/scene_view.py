@@ -6,7 +6,7 @@ import numpy as np
 
 from physics import Box, Compound, Gripper, Part, Sphere, Static
 from physics.rotation import multiply, rotate
-from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Particles, Sign
+from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
 
 if TYPE_CHECKING:
     from rigid_envs.episodes.runner import Runner
@@ -74,10 +74,10 @@ def _solid(
     return found
 
 
-def signs(runner: "Runner", world: int) -> list[Sign]:
-    """Goal and marks of one world, as its task has them."""
+def markers(runner: "Runner", world: int) -> list[Marker]:
+    """Goal and other markers of one world, as its task defines them."""
     goal = runner.goals[world].astype(float)
-    return list(runner.task.signs(runner.world, world, goal))
+    return list(runner.task.markers(runner.world, world, goal))
 
 
 def forces(runner: "Runner", world: int, *, particles: bool = False) -> list[Arrow]:

@@ -113,7 +113,7 @@ class Mark:
         positive("Mark.radius", self.radius)
 
 
-Sign = Goal | Ghost | Mark
+Marker = Goal | Ghost | Mark
 """What is drawn without being solid."""
 
 

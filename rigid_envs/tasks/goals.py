@@ -1,7 +1,8 @@
-"""Distance of goals.
+"""Distance between goals.
 
-A goal is a row of points of three components each; what is left over at its end is a point of
-fewer. Two goals are as far apart as their points that are farthest apart.
+A goal is a row of points with three components each. If the number of components is not a multiple
+of three, the last point has fewer. The distance between two goals is the largest of the distances
+between their corresponding points.
 """
 
 import math
@@ -16,8 +17,8 @@ Array = np.ndarray
 
 
 @kernel
-def _apart(a, b, i):
-    """Distance of the goals a[:, i] and b[:, i]."""
+def _goal_distance(a, b, i):
+    """Distance between the goals a[:, i] and b[:, i]."""
     largest, n = 0.0, a.shape[0]
     for point in range(0, n, 3):
         square = 0.0
@@ -37,13 +38,13 @@ def _make_distances() -> Any:
     def distances(a, b, out):
         _ = sources
         for i in range(out.shape[0]):
-            out[i] = _apart(a, b, i)
+            out[i] = _goal_distance(a, b, i)
 
     return distances
 
 
 def distance(a: Any, b: Any) -> Any:
-    """Distance [...] m of goals [..., n], of points if n is 3; the leading axes broadcast."""
+    """Distance [...] m between goals [..., n]; between points if n is 3. Leading axes broadcast."""
     a, b = np.asarray(a), np.asarray(b)
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)

@@ -1,8 +1,12 @@
-"""Hand: a parallel gripper as a task's tool: its scene, its actions and what it tells of itself.
+"""A parallel gripper that tasks use as their hand: scene, actions and observation.
 
-The hand moves along x, y and z; its fingers close along y. Two cubes of 3 cm, its pads, are all of
-it that touches. Where its weight or a load pulls it from its reference, it stays: an action counts
-from the reference, of which the hand may be short by three quarters of a stride, no more.
+The hand moves along x, y and z. Its two fingers close along y. Only its two pads collide: cubes of
+3 cm.
+
+A servo pulls the hand towards a reference position, and actions move the reference. Actions are
+relative to the reference, not to the hand: a loaded hand hangs below its reference, so actions
+relative to the hand would lower it a little more in each step. The reference stays within three
+quarters of a stride of the hand.
 """
 
 from dataclasses import dataclass
@@ -18,31 +22,29 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Hand:
-    """A gripper with its workspace.
+    """A gripper and its workspace.
 
     Args:
-        home: m, where it is at the start.
-        low: m, lower corner of its workspace.
-        high: m, upper corner.
-        stride: m a step along each axis at full action.
-        widest: m between the pads when open.
+        home: initial position in m.
+        low: lower corner of the workspace in m.
+        high: upper corner of the workspace in m.
+        stride: displacement of the reference per step along each axis at full action, in m.
+        max_opening: distance between the open pads in m.
     """
 
     home: Vector
     low: Vector
     high: Vector
     stride: float
-    widest: float = 0.08
+    max_opening: float = 0.08
 
     PAD: ClassVar[float] = 0.015  # m, half the width of a pad
     FINGER_MASS: ClassVar[float] = 0.3  # kg
-    FORCE: ClassVar[float] = 14.0  # N of the carriage along each axis
-    FREQUENCY: ClassVar[float] = (
-        40.0  # rad/s, of its servos: it starts no faster than pads can hold
-    )
-    GRIP: ClassVar[float] = 4.0  # N with which each finger presses
-
-    DAMPING: ClassVar[float] = 1.0  # of its servos, a share of critical
+    CARRIAGE_FORCE: ClassVar[float] = 14.0  # N, limit along each axis
+    GRIP_FORCE: ClassVar[float] = 4.0  # N, limit of each finger
+    # rad/s; a faster servo would accelerate more than the friction of the pads can hold
+    SERVO_FREQUENCY: ClassVar[float] = 40.0
+    SERVO_DAMPING: ClassVar[float] = 1.0  # as a fraction of critical damping
 
     actions: ClassVar = ("hand x", "hand y", "hand z", "grip")
     bounds: ClassVar = (
@@ -54,47 +56,59 @@ class Hand:
     )
 
     def gripper(self, opening: float, material: Material) -> Gripper:
-        """The tool, with so many m between its pads."""
+        """The gripper of a scene, with `opening` m between its pads."""
         return Gripper(
             Box((self.PAD,) * 3),
             mass=self.FINGER_MASS,
-            force_limit=self.FORCE,
-            grip_limit=self.GRIP,
+            force_limit=self.CARRIAGE_FORCE,
+            grip_limit=self.GRIP_FORCE,
             position=self.home,
             distance=opening + 2.0 * self.PAD,
-            frequency=self.FREQUENCY,
-            damping_ratio=self.DAMPING,
+            frequency=self.SERVO_FREQUENCY,
+            damping_ratio=self.SERVO_DAMPING,
             material=material,
         )
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
-        """Moves the hand by up to a stride along each axis; grip -1 closes it and 1 opens it."""
+        """Commands the drives by actions [count, 4]; a grip of -1 closes and of 1 opens the hand.
+
+        Args:
+            world: the worlds.
+            now: current poses and velocities.
+            actions: [count, 4] within [-1, 1].
+            frame: duration of a step in s.
+        """
         target = self.stride * actions[:, :3] + self.reference(now)
-        hand, slack = self.place(now), 0.75 * self.stride
+        hand, slack = self.position(now), 0.75 * self.stride
         target = np.minimum(np.maximum(target, hand - slack), hand + slack)
         target = np.minimum(np.maximum(target, self.low), self.high)
-        opening = 0.5 * self.widest * (actions[:, 3] + 1.0)
-        world.move_drives(self.fingers(target, opening), frame)
+        opening = 0.5 * self.max_opening * (actions[:, 3] + 1.0)
+        world.move_drives(self.pad_positions(target, opening), frame)
 
-    def fingers(self, place: Array, opening: Any = None) -> Array:
-        """Both pads [count, 2, 3] m of a hand at a place [count, 3] m, wide open if not told."""
-        half = 0.5 * (self.widest if opening is None else opening) + self.PAD
-        fingers = np.stack([place, place], axis=1)
-        fingers[:, 0, 1] -= half
-        fingers[:, 1, 1] += half
-        return fingers
+    def pad_positions(self, hand: Array, opening: Any = None) -> Array:
+        """Positions [count, 2, 3] m of both pads.
 
-    def hold(self, scene: Scene, like: World, frame: float) -> tuple[Array, Array]:
-        """Where pads [1, 2, 3] m and bodies [1, bodies, 3] m are once the grip has closed at home.
+        Args:
+            hand: [count, 3] m, position of the hand.
+            opening: [count] m between the pads; `max_opening` if None.
+        """
+        half = 0.5 * (self.max_opening if opening is None else opening) + self.PAD
+        pads = np.stack([hand, hand], axis=1)
+        pads[:, 0, 1] -= half
+        pads[:, 1, 1] += half
+        return pads
 
-        How deep the pads press in depends on the fidelity, but not on a body's size.
+    def settled_grasp(self, scene: Scene, like: World, frame: float) -> tuple[Array, Array]:
+        """Positions of pads [1, 2, 3] m and bodies [1, bodies, 3] m after closing the grip at home.
+
+        How deep the pads press in depends on the fidelity, but not on the size of the body.
 
         Args:
             scene: a body between the pads.
-            like: a world of the fidelity.
-            frame: s of a step.
+            like: a world with the fidelity to use.
+            frame: duration of a step in s.
         """
-        # its numbers are those of worlds that are alike; varied only to share compiled kernels
+        # the sizes are those of the scene; the same features mean no further kernels to compile
         world = World(scene, like.fidelity, varied=like.features.varied)
         closed = np.array(self.home) + np.zeros((2, 3))
         world.move_drives(closed, frame)
@@ -103,32 +117,32 @@ class Hand:
             world.move_drives(closed, frame)
         return world.drive_position.copy(), world.position.copy()
 
-    def place(self, now: Readout) -> Array:
-        """The middle between the pads, [count, 3] m."""
+    def position(self, now: Readout) -> Array:
+        """Midpoint [count, 3] m between the pads."""
         return 0.5 * (now.position[:, -2] + now.position[:, -1])
 
     def reference(self, now: Readout) -> Array:
-        """Where the carriage's servo pulls to, [count, 3] m."""
+        """Position [count, 3] m to which the servo pulls the hand."""
         return 0.5 * (now.reference[:, -2] + now.reference[:, -1])
 
     def opening(self, now: Readout) -> Array:
-        """Between the pads, [count] m."""
-        place = now.position
-        return np.asarray(place[:, -1, 1] - place[:, -2, 1] - 2.0 * self.PAD)
+        """Distance [count] m between the pads."""
+        pads = now.position
+        return np.asarray(pads[:, -1, 1] - pads[:, -2, 1] - 2.0 * self.PAD)
 
-    def asked(self, now: Readout) -> Array:
-        """What the fingers are asked to open to, [count] m."""
-        asked = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
-        return np.clip(asked, 0.0, self.widest)
+    def commanded_opening(self, now: Readout) -> Array:
+        """Distance [count] m between the pads that the last action asked for."""
+        opening = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
+        return np.clip(opening, 0.0, self.max_opening)
 
-    def slackness(self, now: Readout) -> Array:
-        """What the fingers are asked to open to, as a share [count] of what they are; at most 1."""
-        return np.minimum(self.asked(now) / np.maximum(self.opening(now), 1e-3), 1.0)
+    def opening_ratio(self, now: Readout) -> Array:
+        """Commanded opening divided by opening [count], at most 1."""
+        return np.minimum(self.commanded_opening(now) / np.maximum(self.opening(now), 1e-3), 1.0)
 
     def observe(self, now: Readout, out: Array) -> None:
-        """Writes what `bounds` names, [count, 11]."""
+        """Writes the components [count, 11] that `bounds` names."""
         velocity = now.linear_velocity
-        out[:, 0:3] = self.place(now)
+        out[:, 0:3] = self.position(now)
         out[:, 3:6] = 0.5 * (velocity[:, -2] + velocity[:, -1])
         out[:, 6] = self.opening(now)
         out[:, 7] = velocity[:, -1, 1] - velocity[:, -2, 1]

@@ -1,4 +1,4 @@
-"""Rewards: one function of goals and named raw terms, for a step and for relabelling."""
+"""Rewards: one function of goals and named raw terms, for steps and for relabelled goals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,66 +11,74 @@ from rigid_envs.tasks.goals import distance
 Array = np.ndarray
 
 REWARD_TYPES = ("sparse", "dense")
-# terms that follow from the goals
-OF_GOALS = ("success", "distance", "time")
-# in the info: the goals that the terms beside it were made for
-GOALS_OF_TERMS = "goals_of_terms"
+# terms that need no info: the first two follow from the goals, "time" is always 1
+GOAL_TERMS = ("success", "distance", "time")
+# entry of the info: the goals for which the raw terms of the same info were computed
+STEP_GOALS = "step_goals"
 
 
 @dataclass(frozen=True)
 class Reward:
     """Sparse and dense reward of a goal-conditioned task.
 
-    Sparse: 0 where the goals are within the threshold, else -1.
-    Dense: the sum of weight times raw term. Three terms follow from the goals: "success", 1 where
-    solved, "distance", m apart with a minus, and "time", always 1; the others are the task's.
+    Sparse: 0 where the goal distance is at most the threshold, else -1.
+    Dense: the sum of weight times raw term. Three terms exist in every task: "success", 1 where the
+    task is solved; "distance", minus the goal distance in m; and "time", always 1. The task
+    computes the others.
 
     Args:
-        threshold: m, largest distance that counts as solved.
-        weights: of the raw terms, by name.
-        hurry: weight of "time" where success ends an episode: as much below 0 as the others can
-            pay together short of success, or it would pay to put the end off. Elsewhere it would
-            be a constant that a learner's value function has to find again and again.
+        threshold: largest goal distance in m at which the task counts as solved.
+        weights: weight of each raw term of the dense reward, by name.
+        time_penalty: subtracted from the dense reward in each step if success terminates the
+            episode. It must be at least what the other terms can pay in one step before success:
+            otherwise, delaying success would pay. It is not used if episodes continue after
+            success: there it would only add a constant, which the value function would have to
+            learn.
     """
 
     threshold: float
     weights: Mapping[str, float]
-    hurry: float = 0.0
+    time_penalty: float = 0.0
 
-    def ending(self) -> "Reward":
-        """The reward where success ends an episode."""
-        weights = {**self.weights, "time": self.weights.get("time", 0.0) + self.hurry}
-        return replace(self, weights=weights, hurry=0.0) if self.hurry else self
+    def with_time_penalty(self) -> "Reward":
+        """The reward to use if success terminates the episode."""
+        if not self.time_penalty:
+            return self
+        time = self.weights.get("time", 0.0) - self.time_penalty
+        return replace(self, weights={**self.weights, "time": time}, time_penalty=0.0)
 
-    def success(self, apart: Any) -> Any:
-        """Whether goals at these distances [...] m agree."""
-        return apart <= self.threshold
+    def success(self, goal_distance: Any) -> Any:
+        """Whether [...] the task is solved at these goal distances [...] in m."""
+        return goal_distance <= self.threshold
 
     def sparse(self, success: Any) -> Any:
-        """-1 or 0, [...]; a function of the goals alone."""
+        """The sparse reward [...]: -1 or 0."""
         return success - 1.0
 
-    def dense(self, success: Any, apart: Any, terms: Mapping[str, Array]) -> Any:
-        """The shaped reward, [...]."""
-        known = {"success": success, "distance": -apart, "time": 1.0}
-        reward = np.zeros_like(apart)
+    def dense(self, success: Any, goal_distance: Any, terms: Mapping[str, Array]) -> Any:
+        """The dense reward [...]."""
+        known = {"success": success, "distance": -goal_distance, "time": 1.0}
+        reward = np.zeros_like(goal_distance)
         for name, weight in self.weights.items():
             reward = reward + weight * (known[name] if name in known else terms[name])
         return reward
 
-    def compute(self, kind: str, achieved: Array, desired: Array, info: Any) -> Any:
-        """The reward of goals [..., goal], as environments and HER ask for it.
+    def compute(self, reward_type: str, achieved: Array, desired: Array, info: Any) -> Any:
+        """The reward of pairs of goals, as `compute_reward` of the environments returns it.
 
         Args:
-            kind: "sparse" or "dense".
+            reward_type: "sparse" or "dense".
             achieved: [..., goal].
             desired: [..., goal].
-            info: of the step: a dict, or a sequence of dicts for a batch; the sparse reward
-                doesn't look at it, nor does a dense one whose terms all follow from the goals.
+            info: the info of the step: a dict, or a sequence of dicts for a batch. The sparse
+                reward ignores it.
+
+        Returns:
+            Rewards [...]; a float for a single pair.
 
         Raises:
-            ValueError: goals of different shape; a dense reward whose terms aren't in the info, or
-                are of other goals.
+            ValueError: the shapes of the goals differ; the dense reward finds no terms in the info,
+                or terms that were computed for other goals.
         """
         achieved, desired = np.asarray(achieved), np.asarray(desired)
         if achieved.shape != desired.shape:
@@ -78,52 +86,61 @@ class Reward:
                 f"achieved_goal and desired_goal must have the same shape, got {achieved.shape} "
                 f"and {desired.shape}"
             )
-        apart = np.asarray(distance(achieved, desired))
-        success = self.success(apart)
-        if kind == "sparse":
+        goal_distance = np.asarray(distance(achieved, desired))
+        success = self.success(goal_distance)
+        if reward_type == "sparse":
             reward = self.sparse(success)
         else:
-            reward = self.dense(success, apart, self._terms(info, achieved, desired))
+            reward = self.dense(success, goal_distance, self._terms(info, achieved, desired))
         return float(reward) if achieved.ndim == 1 else reward
 
     @property
-    def of_task(self) -> list[str]:
-        """Names of the weighted terms that don't follow from the goals."""
-        return [name for name in self.weights if name not in OF_GOALS]
+    def task_terms(self) -> list[str]:
+        """Names of the weighted terms that the task computes."""
+        return [name for name in self.weights if name not in GOAL_TERMS]
 
     def _terms(self, info: Any, achieved: Array, desired: Array) -> dict[str, Array]:
-        """The task's terms from the info of the step that ended with these goals."""
-        names = self.of_task
+        """The task's terms from the info of the step that returned these goals."""
+        names = self.task_terms
         if not names:
             return {}
         try:
-            found = {name: column(info, name) for name in (*names, GOALS_OF_TERMS)}
+            found = {name: info_values(info, name) for name in (*names, STEP_GOALS)}
         except (KeyError, TypeError):
             raise ValueError(
-                f"the dense reward needs the terms {names} of the step's info, and "
-                f"{GOALS_OF_TERMS!r} beside them, got "
-                f'{info!r}; relabelled goals (HER) need reward_type="sparse"'
+                f"the dense reward needs {[*names, STEP_GOALS]} in info: pass the info of the step "
+                f"that returned the goals. Got {describe_info(info)}. To relabel goals (HER), use "
+                'reward_type="sparse"'
             ) from None
-        if not np.array_equal(found.pop(GOALS_OF_TERMS), goals_of_terms(achieved, desired)):
+        if not np.array_equal(found.pop(STEP_GOALS), join_goals(achieved, desired)):
             raise ValueError(
-                f"the dense reward of other goals than the step's can't be told: the terms {names} "
-                "of the info hold for the achieved and desired goal that the step returned alone; "
-                'relabelled goals (HER) need reward_type="sparse"'
+                "the dense reward cannot be computed for other goals than those of the step: "
+                f"{names} in info are valid only for the goals that the step returned. To relabel "
+                'goals (HER), use reward_type="sparse"'
             )
         return found
 
 
-def goals_of_terms(achieved: Array, desired: Array) -> Array:
-    """What the info says of the goals [..., goal] that its terms are of: [..., 2 goal]."""
+def join_goals(achieved: Array, desired: Array) -> Array:
+    """The entry `STEP_GOALS` of an info: [..., 2 goal] from goals [..., goal]."""
     return np.concatenate([achieved, desired], axis=-1)
 
 
-def column(info: Any, name: str) -> Array:
-    """An entry [...] of an info, or of each of a sequence of infos.
+def info_values(info: Any, name: str) -> Array:
+    """Values [...] of an entry of an info, or of a sequence of infos.
 
     Raises:
-        KeyError, TypeError: there is none.
+        KeyError, TypeError: there is no such entry.
     """
     if isinstance(info, Mapping):
         return np.asarray(info[name])
     return np.array([one[name] for one in info])
+
+
+def describe_info(info: Any) -> str:
+    """What an info or a state contains, for error messages."""
+    if isinstance(info, Mapping):
+        return f"a dict with {sorted(map(str, info))}"
+    if isinstance(info, list | tuple | np.ndarray) and len(info):
+        return f"{len(info)} infos, the first of which is {describe_info(info[0])}"
+    return f"{info!r:.200}"

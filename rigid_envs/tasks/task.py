@@ -1,4 +1,8 @@
-"""What a task is: everything about an environment but the engine, the episode and Gymnasium."""
+"""The base class of tasks: everything that one task has and another has not.
+
+The engine (`physics`), the episodes (`rigid_envs.episodes`) and Gymnasium's interface are the same
+for all tasks.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -8,69 +12,76 @@ import numpy as np
 
 from physics import Readout, Scene, World
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.view import Goal, Sign
+from rigid_envs.rendering.view import Goal, Marker
 from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
+Bounds = tuple[tuple[str, str, float, float], ...]
+"""(name, unit, low, high) of each component of an array."""
 
 
 class Task(ABC):
-    """A goal-conditioned task on many worlds at once; arrays have a leading world axis.
+    """A goal-conditioned task in `count` worlds at once.
+
+    A task is a class of NumPy functions. All arrays have a leading world axis, so the same class
+    runs one world and thousands of worlds. The arguments of a task's constructor, such as a number
+    of blocks, are also arguments of `gym.make` and `gym.make_vec`.
 
     Attributes:
-        frame: s of one environment step.
-        actions: names of the action's components, each within [-1, 1].
-        bounds: name, unit, low and high of every component of the observation, in order.
-        goal_bounds: likewise of a goal.
-        guides: likewise of what `guide` writes; by default the way from achieved to desired goal.
-        draws: random numbers that one episode's start takes.
-        reward: how goals and reward terms make a reward.
-        camera: that sees all of the task.
-        sizes: least and largest factor of its bodies' sizes that `start` takes in worlds whose
-            bodies have sizes of their own; None if they must be as in the scene.
-
-    What an instance needs to know beyond its class, as a number of blocks, are arguments of its
-    constructor, which gym.make hands on.
+        frame: duration of one environment step in s.
+        max_episode_steps: number of steps after which an episode is truncated.
+        actions: names of the action's components. Each component lies within [-1, 1].
+        bounds: (name, unit, low, high) of each component of the observation, in order.
+        goal_bounds: (name, unit, low, high) of each component of a goal.
+        draw_count: how many random numbers the start of an episode needs.
+        reward: the success threshold and the weights of the dense reward.
+        camera: the camera of rendered frames. It should see the whole workspace.
+        size_range: smallest and largest factor of body sizes that `start` supports when each world
+            has its own sizes; None if the task supports only the sizes of its scene.
     """
 
     frame: ClassVar[float] = 1.0 / 25.0
+    max_episode_steps: int = 50
     actions: tuple[str, ...]
-    bounds: tuple[tuple[str, str, float, float], ...]
-    goal_bounds: tuple[tuple[str, str, float, float], ...]
-    draws: int
+    bounds: Bounds
+    goal_bounds: Bounds
+    draw_count: int
     reward: Reward
     camera: Camera = Camera()
-    sizes: tuple[float, float] | None = None
+    size_range: tuple[float, float] | None = None
 
     @property
-    def guides(self) -> tuple[tuple[str, str, float, float], ...]:
-        """Name, unit, low and high of every component that `guide` writes."""
-        return tuple((f"{name} to go", unit, a - b, b - a) for name, unit, a, b in self.goal_bounds)
+    def guide_bounds(self) -> Bounds:
+        """(name, unit, low, high) of each component that `guide` writes."""
+        return tuple(
+            (f"{name} difference", unit, low - high, high - low)
+            for name, unit, low, high in self.goal_bounds
+        )
 
     @abstractmethod
     def scene(self) -> Scene:
-        """What is in each world."""
+        """The bodies, statics and drives of each world."""
 
     @abstractmethod
     def start(self, world: World, mask: Array, draws: Array) -> Array:
-        """Puts the worlds of the mask [count] into the start of an episode.
+        """Sets the initial state of an episode in the worlds of the mask.
 
         Args:
-            world: to write to.
-            mask: [count] bool.
-            draws: [chosen, draws] uniform in [0, 1[.
+            world: the worlds to write to.
+            mask: [count] bool; n of its entries are true.
+            draws: [n, draw_count] random numbers, uniform in [0, 1).
 
         Returns:
-            [chosen, goal] desired goals.
+            Desired goals [n, goal].
         """
 
     @abstractmethod
     def act(self, world: World, now: Readout, actions: Array) -> None:
-        """Commands the drives by actions [count, actions] within [-1, 1]."""
+        """Commands the drives for one step, given actions [count, actions] within [-1, 1]."""
 
     @abstractmethod
     def observe(self, world: World, now: Readout, out: Array) -> None:
-        """Writes observations [count, observation]."""
+        """Writes observations [count, observation] to `out`."""
 
     @abstractmethod
     def achieved(self, world: World, now: Readout) -> Array:
@@ -78,19 +89,30 @@ class Task(ABC):
 
     @abstractmethod
     def terms(
-        self, world: World, now: Readout, achieved: Array, desired: Array, apart: Array
+        self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """Raw reward terms [count] that can't be had from the goals [count, goal] alone.
+        """Raw reward terms [count] that do not follow from the goals [count, goal] alone.
 
-        `apart` [count] m is the distance of the goals, which every reward needs anyway.
+        Args:
+            world: the worlds.
+            now: current poses and velocities.
+            achieved: [count, goal].
+            desired: [count, goal].
+            goal_distance: [count] m, distance between the two goals.
+
+        Returns:
+            A dict with at least every term in `reward.weights` that does not follow from the goals.
         """
 
     def guide(
         self, world: World, now: Readout, achieved: Array, desired: Array, out: Array
     ) -> None:
-        """Writes what is left to do [count, guides], of goals [count, goal]."""
+        """Writes the task guide [count, guide] to `out`; by default, desired minus achieved goal.
+
+        The policy observes it with `observe_task_guide=True`.
+        """
         out[...] = desired - achieved
 
-    def signs(self, world: World, index: int, goal: Array) -> Sequence[Sign]:
-        """What marks the goal [goal] in a picture of world `index`; by default, a place."""
+    def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
+        """What marks the goal [goal] in a rendered frame of world `index`; by default, a disc."""
         return [Goal(goal[:3], self.reward.threshold)]

@@ -1,10 +1,10 @@
-"""Reward wrappers: of single environments here, of vector environments in `vector`, same names."""
+"""Reward wrappers for single environments; those in `vector` wrap vector environments."""
 
 from rigid_envs.wrappers import vector
 from rigid_envs.wrappers.potential import goal_potential
 from rigid_envs.wrappers.single import (
     ActionPenalty,
-    ClipReward,
+    BoundReward,
     PotentialShaping,
     ScaleReward,
     SmoothnessPenalty,
@@ -16,7 +16,7 @@ from rigid_envs.wrappers.staged import Stage
 
 __all__ = [
     "ActionPenalty",
-    "ClipReward",
+    "BoundReward",
     "PotentialShaping",
     "ScaleReward",
     "SmoothnessPenalty",

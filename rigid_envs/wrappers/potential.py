@@ -1,4 +1,4 @@
-"""Shaping by a potential, which changes no best policy."""
+"""Potential-based shaping, which does not change the optimal policies."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,57 +16,57 @@ Potential = Callable[[Observation], Any]
 
 @dataclass(frozen=True)
 class PotentialShaping(Rule):
-    """Pays for what a potential gains: the best policy stays the best.
+    """Adds the change of a potential; the optimal policies stay the same.
 
-    r' = r + F, F = gamma Phi(s') - Phi(s); Phi(s') is 0 where the episode terminated, and counts
-    where it was truncated. Over an episode the discounted sum of F is
-    gamma^T Phi(s_T) - Phi(s_0), whatever was done. Info: `shaping`, F.
+    r' = r + F with F = gamma Phi(s') - Phi(s). Phi(s') counts as 0 where the episode terminated,
+    but not where it was truncated. Over an episode of T steps, the discounted sum of F is
+    gamma^T Phi(s_T) - Phi(s_0), whatever the policy does. Info: `shaping`, F.
 
     Source: Ng, Harada & Russell, Policy invariance under reward transformations, ICML 1999.
 
     Args:
-        potential: Phi: takes observations {key: [..., k]} and gives [...]; `goal_potential`, or a
-            function of yours.
+        potential: Phi, a function that takes observations {key: [..., k]} and returns [...]:
+            `goal_potential` or your own function.
         gamma: the learner's discount factor.
     """
 
     potential: Potential
     gamma: float
 
-    kept = ("shaping",)
-    advice = (
-        "HER doesn't tell the state before the step, whose potential for another goal would be "
-        "needed: leave PotentialShaping out, since without it the same policies are best"
+    stored_terms = ("shaping",)
+    her_advice = (
+        "HER does not provide the state before the step, whose potential for the new goal would be "
+        "needed. Remove PotentialShaping: the optimal policies are the same without it"
     )
 
     def __post_init__(self) -> None:
-        """Checks the fields."""
+        """Checks the arguments."""
         if not callable(self.potential):
             raise TypeError(f"potential must be callable, got {self.potential!r}")
         object.__setattr__(self, "gamma", number("gamma", self.gamma, low=0.0, high=1.0))
 
     @property
-    def of_goal(self) -> bool:
+    def depends_on_goal(self) -> bool:
         """A potential may depend on the goal."""
         return True
 
-    def remember(self, observation: Observation, action: Array) -> Array:
+    def memory(self, observation: Observation, action: Array) -> Array:
         """Phi(s)."""
         value = self.potential(observation)
         return array(
             "potential(observation)", value, observation["achieved_goal"].shape[:-1]
         ).copy()
 
-    def history(self, memory: Any, step: Transition) -> Terms:
+    def step_terms(self, memory: Any, step: Transition) -> Terms:
         """F."""
-        after = self.remember(step.observation, step.action)
+        after = self.memory(step.observation, step.action)
         return {"shaping": self.gamma * np.where(step.terminated, 0.0, after) - memory}
 
-    def pay(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
+    def apply(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
         """See the class."""
         return reward + terms["shaping"], {}
 
 
 def goal_potential(observation: Observation) -> Array:
-    """A potential for every task: minus the distance [...] m of achieved and desired goal."""
+    """A potential for every task: minus the goal distance [...] in m."""
     return -np.asarray(distance(observation["achieved_goal"], observation["desired_goal"]))

@@ -1,7 +1,7 @@
-"""What a wrapper does to rewards, as pure functions of arrays: one rule for one world and for many.
+"""The base class of reward rules: what a wrapper does to rewards, as functions of arrays.
 
-Every array has any leading axes: none for a single environment, one for a vector environment, and
-whatever compute_reward is asked for.
+A rule works for one world, for many worlds and for the batches of `compute_reward`: all arrays may
+have any leading axes [...]. A single environment has none, a vector environment has one.
 """
 
 from abc import ABC, abstractmethod
@@ -21,12 +21,13 @@ Terms = dict[str, Array]
 
 @dataclass(frozen=True)
 class Goals:
-    """A pair of goals, and what follows from it.
+    """A pair of goals.
 
     Args:
         achieved: [..., goal].
         desired: [..., goal].
-        reward: of the task, which tells when goals agree.
+        reward: the task's reward, whose threshold defines success; None if the rule does not need
+            it.
     """
 
     achieved: Array
@@ -34,23 +35,24 @@ class Goals:
     reward: Reward | None
 
     def distance(self) -> Array:
-        """[...] m apart."""
+        """Goal distance [...] in m."""
         return np.asarray(distance(self.achieved, self.desired))
 
     def success(self) -> Array:
         """Whether [...] the task is solved."""
-        assert self.reward is not None  # asked for only by rules that judge
+        assert self.reward is not None  # only rules with `needs_success` call this
         return np.asarray(self.reward.success(self.distance()))
 
 
 @dataclass(frozen=True)
 class Transition:
-    """A step of an episode.
+    """The end of one step of an episode.
 
     Args:
-        observation: after it, {key: [..., k]}; of the episode that it belongs to, even if it ended.
-        action: [..., k] as it was carried out, within the action space.
-        terminated: [...] whether the episode ended there for good.
+        observation: {key: [..., k]} after the step. If the episode ended and the environment was
+            reset in the same step, this is the last observation of the old episode.
+        action: [..., k], clipped to the action space.
+        terminated: [...] whether the episode terminated in this step.
     """
 
     observation: Observation
@@ -61,40 +63,46 @@ class Transition:
 class Rule(ABC):
     """How a wrapper changes the reward.
 
-    `pay` is the formula: steps and compute_reward both call it, so they can't disagree. What it
-    needs and goals can't tell is worked out by `history` and stands in the step's info, whence
-    compute_reward takes it.
+    `apply` is the formula. Steps and `compute_reward` both call it, so they cannot disagree. What
+    the formula needs besides the goals is computed by `step_terms` and stored in the step's info,
+    where `compute_reward` finds it.
 
     Attributes:
-        judges: whether it asks if goals agree.
-        acts: whether it looks at actions.
-        kept: names of what `history` gives.
-        advice: what to do with HER where it can't be relabelled.
+        needs_success: whether the formula uses success, and so the task's threshold.
+        needs_action: whether the formula uses the action.
+        stored_terms: names of the terms that `step_terms` returns.
+        her_advice: what to do if the reward of relabelled goals cannot be computed.
     """
 
-    judges: ClassVar[bool] = False
-    acts: ClassVar[bool] = False
-    kept: ClassVar[tuple[str, ...]] = ()
-    advice: ClassVar[str] = ""
+    needs_success: ClassVar[bool] = False
+    needs_action: ClassVar[bool] = False
+    stored_terms: ClassVar[tuple[str, ...]] = ()
+    her_advice: ClassVar[str] = ""
 
     @property
-    def reads(self) -> tuple[str, ...]:
-        """Terms that it takes from the wrapped environment's info."""
+    def info_terms(self) -> tuple[str, ...]:
+        """Names of the terms that the rule reads from the info of the wrapped environment."""
         return ()
 
     @property
-    def of_goal(self) -> bool:
-        """Whether a term from the info holds for no other goals than the step's."""
+    def depends_on_goal(self) -> bool:
+        """Whether the stored terms or the info terms are valid only for the goals of the step."""
         return False
 
-    def remember(self, observation: Observation, action: Array) -> Array | None:
-        """What [..., k] or [...] the next step needs of this one; at a start, actions are NaN."""
+    def memory(self, observation: Observation, action: Array) -> Array | None:
+        """What the next step needs of this one, [..., k] or [...]; at a reset, `action` is NaN."""
         return None
 
-    def history(self, memory: Any, step: Transition) -> Terms:
+    def step_terms(self, memory: Any, step: Transition) -> Terms:
         """Raw terms [...] that depend on more than the goals after the step."""
         return {}
 
     @abstractmethod
-    def pay(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
-        """The new reward, and raw terms that follow from goals and the old reward, all [...]."""
+    def apply(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
+        """The new reward [...], and raw terms [...] for the info.
+
+        Args:
+            reward: [...] reward of the wrapped environment.
+            goals: goals after the step.
+            terms: info terms and stored terms, [...] each.
+        """

@@ -1,4 +1,4 @@
-"""Rollouts that several files of tests compare."""
+"""Environments, actions and comparisons that several test files use."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,13 +11,14 @@ import rigid_envs  # noqa: F401  (registers the ids)
 
 PUSH, STACK, THROW = (f"RigidEnvs/{task}-v0" for task in ("Push", "Stack", "Throw"))
 IDS = [PUSH, STACK, THROW]
+DENSE_IDS = [f"RigidEnvs/{task}Dense-v0" for task in ("Push", "Stack", "Throw")]
 PRESETS = ["fast", "balanced", "accurate", "solid"]
 REWARDS = ["sparse", "dense"]
 EPISODE = 50
 
 
 def make(env_id: str = PUSH, **kwargs: Any) -> gym.Env:
-    """The environment itself, in no wrapper."""
+    """The environment without the wrappers of gym.make."""
     return gym.make(env_id, **kwargs).unwrapped
 
 
@@ -26,7 +27,7 @@ def make_vec(num_envs: int, env_id: str = PUSH, **kwargs: Any) -> VectorEnv:
 
 
 def random_actions(steps: int, worlds: int, seed: int = 0, size: int = 3) -> np.ndarray:
-    """[steps, worlds, size]; odd worlds hold full actions for ten steps, the others draw anew."""
+    """[steps, worlds, size]; odd worlds keep full actions for ten steps."""
     random = np.random.default_rng(seed)
     actions = random.uniform(-1.0, 1.0, (steps, worlds, size))
     full = np.sign(random.uniform(-1.0, 1.0, (-(-steps // 10), worlds, size))).repeat(10, axis=0)
@@ -40,12 +41,12 @@ def toward_cube(observation: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def push_blindly(observation: dict[str, np.ndarray], noise: np.ndarray) -> np.ndarray:
-    """Actions that depend on every bit of what was seen, and keep touching the cube."""
+    """Actions that depend on every bit of the observation, and keep touching the cube."""
     return np.clip(toward_cube(observation) + 0.5 * noise, -1.0, 1.0)
 
 
 def put_cubes_on_goals(env: Any, worlds: np.ndarray | None = None, shift: float = 0.0) -> None:
-    """Solves the chosen worlds, all if None; `shift` m beside the goal."""
+    """Puts the cube on its goal, or `shift` m away from it, in some worlds; in all if None."""
     runner = env._runner
     worlds = np.ones(runner.count, dtype=bool) if worlds is None else worlds
     goals = runner.goals[worlds, None].astype(float)
@@ -58,22 +59,30 @@ def steps_of(env: gym.Env | VectorEnv, actions: np.ndarray) -> Iterator[tuple[An
 
 
 def one_world(result: tuple[Any, ...], world: int) -> tuple[Any, ...]:
-    """What a vector environment's step, or reset, says of one world, as the single one says it."""
+    """One world's part of a vector environment's step or reset, as a single environment's."""
     *head, info = result
-    told = {
+    entries = {
         k: v[world].item() if v.ndim == 1 else v[world]
         for k, v in info.items()
         if not k.startswith(("_", "final"))
     }
-    return *(_row(part, world) for part in head), told
+    return *(_row(part, world) for part in head), entries
 
 
 def _row(part: Any, world: int) -> Any:
     return {k: v[world] for k, v in part.items()} if isinstance(part, dict) else part[world].item()
 
 
+def some_worlds(result: tuple[Any, ...], worlds: Any) -> tuple[Any, ...]:
+    """Some worlds' part of a vector environment's step or reset, as arrays."""
+    return tuple(
+        {k: v[worlds] for k, v in part.items()} if isinstance(part, dict) else part[worlds]
+        for part in result
+    )
+
+
 def assert_same(a: Any, b: Any) -> None:
-    """Equal to the last bit, in nested dicts and tuples of arrays and numbers."""
+    """Compares nested dicts and tuples of arrays and numbers, bitwise."""
     if isinstance(a, dict):
         assert a.keys() == b.keys()
         for key in a:
@@ -94,12 +103,12 @@ def assert_same(a: Any, b: Any) -> None:
 
 
 def assert_untouched(env: Any, before: dict[str, Any]) -> None:
-    """An environment still holds the state that `get_state` gave."""
+    """The state of an environment is still the one that `get_state` returned."""
     after = env.get_state()
     assert_same(_in_bytes(after), _in_bytes(before))
 
 
 def _in_bytes(state: dict[str, Any]) -> dict[str, Any]:
-    """With the world's arrays as bytes, since NaN doesn't equal NaN."""
+    """With the world's arrays as bytes, since NaN does not equal NaN."""
     world = {name: array.tobytes() for name, array in state["world"].state._asdict().items()}
     return {**state, "world": world}

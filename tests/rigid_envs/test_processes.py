@@ -1,4 +1,4 @@
-"""Environments work in other processes, whatever threads the parent has run."""
+"""Environments work in other processes, whatever threads the parent process has run."""
 
 import functools
 import multiprocessing
@@ -25,12 +25,12 @@ STEPS = {env_id: 2 * EPISODE if env_id == STACK else EPISODE for env_id in IDS}
 
 
 def makers(env_id):
-    """They import the package in the worker, where nothing is registered yet."""
+    """Functions that import the package in the worker, where nothing is registered yet."""
     return [functools.partial(gym.make, f"rigid_envs:{env_id}")] * WORKERS
 
 
 def actions_of(env_id):
-    """Of an episode and a little more."""
+    """Actions for a little more than one episode."""
     size = make(env_id).action_space.shape[0]
     return random_actions(STEPS[env_id] + 5, WORKERS, size=size)
 
@@ -49,7 +49,7 @@ def threads_have_run():
 @pytest.mark.parametrize(
     "context", [c for c in ("fork", "spawn") if c in multiprocessing.get_all_start_methods()]
 )
-def test_async_vector_env_says_what_the_native_one_says(context, env_id):
+def test_async_vector_env_returns_what_the_native_one_returns(context, env_id):
     native = make_vec(WORKERS, env_id)
     envs = AsyncVectorEnv(makers(env_id), context=context)
     try:
@@ -63,7 +63,7 @@ def test_async_vector_env_says_what_the_native_one_says(context, env_id):
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
 def test_many_worlds_run_on_threads_in_a_forked_process(threads_have_run):
-    """The parent's pool of threads doesn't come along."""
+    """A fork does not copy the threads of the parent process."""
     actions = random_actions(3, 1024)
     twin = make_vec(1024, threads=4)
     twin.set_state(threads_have_run.get_state())
@@ -85,7 +85,7 @@ def test_many_worlds_run_on_threads_in_a_forked_process(threads_have_run):
 
 
 @pytest.mark.parametrize("env_id", IDS)
-def test_subproc_vec_env_says_what_the_single_one_says(env_id):
+def test_subproc_vec_env_returns_what_the_single_one_returns(env_id):
     *actions_before, last = actions_of(env_id)[: STEPS[env_id]]
     envs = SubprocVecEnv(makers(env_id))
     try:

@@ -1,4 +1,4 @@
-"""Many worlds behave as many single environments, in Gymnasium's three ways to start anew."""
+"""Many worlds behave as many single environments, in all three autoreset modes of Gymnasium."""
 
 import copy
 import pickle
@@ -24,11 +24,12 @@ from tests.rigid_envs.rollout import (
     push_blindly,
     put_cubes_on_goals,
     random_actions,
+    some_worlds,
     steps_of,
 )
 
 SEED = 1000
-# of every seed that is used below, so that a world's actions don't depend on its place in a batch
+# for each seed used below, so that the actions of a world do not depend on its index in a batch
 NOISE = np.random.default_rng(0).uniform(-1.0, 1.0, (EPISODE, 300, 3)).astype(np.float32)
 NEXT_STEP, SAME_STEP, DISABLED = (
     AutoresetMode.NEXT_STEP,
@@ -76,12 +77,12 @@ def test_observations_lie_in_the_space(fidelity, reward_type):
         assert [part.shape for part in result[1:4]] == [(128,)] * 3
 
 
-@pytest.mark.parametrize("steps", [7, 50, None])
-def test_the_length_of_an_episode_can_be_set(steps):
+@pytest.mark.parametrize("steps", [7, 50, -1])
+def test_the_episode_length_can_be_set(steps):
     envs = make_vec(2, max_episode_steps=steps)
     envs.reset(seed=0)
     truncated = [bool(result[3].all()) for result in steps_of(envs, random_actions(60, 2))]
-    assert truncated.index(True) + 1 == steps if steps else not any(truncated)
+    assert truncated.index(True) + 1 == steps if steps > 0 else not any(truncated)
 
 
 def test_every_info_has_a_mask():
@@ -94,7 +95,7 @@ def test_every_info_has_a_mask():
             np.testing.assert_array_equal(info[f"_{name}"], [True] * 3)
 
 
-def test_what_was_returned_is_never_written_to_again():
+def test_returned_arrays_are_not_written_again():
     envs = make_vec(3, autoreset_mode=SAME_STEP, max_episode_steps=5)
     envs.reset(seed=0)
     results = list(steps_of(envs, random_actions(5, 3)))
@@ -107,27 +108,33 @@ def test_what_was_returned_is_never_written_to_again():
 
 
 def two_episodes_alone(seed, **kwargs):
-    """Everything that the single environment says in the first two episodes of a seed."""
+    """All results of the single environment in the first two episodes of a seed."""
     env = RigidEnv(max_episode_steps=EPISODE, **kwargs)
-    told = []
+    results = []
     for start in ({"seed": seed}, {}):
         observation, info = env.reset(**start)
-        told.append((observation, info))
+        results.append((observation, info))
         for noise in NOISE[:, seed - SEED]:
-            told.append(env.step(push_blindly(observation, noise)))
-            observation = told[-1][0]
-    return told
+            results.append(env.step(push_blindly(observation, noise)))
+            observation = results[-1][0]
+    return results
 
 
 def two_episodes_together(seeds, **kwargs):
-    """What a vector environment says in them, a list of all steps."""
+    """All results of a vector environment in these episodes."""
     envs = make_vec(len(seeds), **kwargs)
-    told = [envs.reset(seed=seeds)]
+    results = [envs.reset(seed=seeds)]
     for _ in range(2):
         for noise in NOISE[:, np.array(seeds) - SEED]:
-            told.append(envs.step(push_blindly(told[-1][0], noise)))
-        told.append(envs.step(NOISE[0, : len(seeds)]))
-    return told[:-1]
+            results.append(envs.step(push_blindly(results[-1][0], noise)))
+        results.append(envs.step(NOISE[0, : len(seeds)]))
+    return results[:-1]
+
+
+def assert_worlds_are_same(few, many, worlds):
+    """Results of a vector environment equal those of some worlds of another one."""
+    for one, other in zip(few, many, strict=True):
+        assert_same(one, some_worlds(other, worlds))
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +143,7 @@ def together():
 
 
 @pytest.mark.parametrize("world", [0, 1, 63, 64, 127, 299])
-def test_a_world_of_many_is_the_single_environment_to_the_last_bit(together, world):
+def test_a_world_of_many_is_bitwise_identical_to_the_single_environment(together, world):
     alone = two_episodes_alone(SEED + world)
     assert len(alone) == len(together) == 2 * EPISODE + 2
     for step, (one, many) in enumerate(zip(alone, together, strict=True)):
@@ -150,7 +157,7 @@ def test_a_world_of_many_is_the_single_environment_to_the_last_bit(together, wor
 
 @pytest.mark.parametrize("fidelity", ["fast", "accurate"])
 @pytest.mark.parametrize("reward_type", REWARDS)
-def test_so_it_is_at_every_preset_and_reward(fidelity, reward_type):
+def test_this_holds_at_other_presets_and_rewards(fidelity, reward_type):
     kwargs = {"fidelity": fidelity, "reward_type": reward_type}
     together = two_episodes_together(list(range(SEED, SEED + 5)), **kwargs)
     alone = two_episodes_alone(SEED + 3, **kwargs)
@@ -167,43 +174,65 @@ def test_the_cube_is_pushed_in_those_episodes(together):
     ("first", "count", "threads"),
     [(0, 1, 1), (0, 2, 2), (60, 7, 1), (10, 65, 2), (100, 129, 2), (0, 300, 2), (0, 300, 5)],
 )
-def test_batch_size_place_and_threads_change_no_bit(together, first, count, threads):
+def test_batch_size_index_and_threads_change_no_bit(together, first, count, threads):
     part = two_episodes_together(list(range(SEED + first, SEED + first + count)), threads=threads)
-    for few, many in zip(part, together, strict=True):
-        for world in range(count):
-            assert_same(one_world(few, world), one_world(many, first + world))
+    assert_worlds_are_same(part, together, np.arange(first, first + count))
 
 
-def test_neighbours_change_no_bit(together):
+def test_the_other_worlds_change_no_bit(together):
     seeds = [SEED + 200, SEED + 5, SEED + 150, SEED + 150]
-    for few, many in zip(two_episodes_together(seeds), together, strict=True):
-        for place, seed in enumerate(seeds):
-            assert_same(one_world(few, place), one_world(many, seed - SEED))
+    assert_worlds_are_same(two_episodes_together(seeds), together, np.array(seeds) - SEED)
 
 
 def test_a_seed_for_all_counts_up_by_world(together):
     assert_same(make_vec(300).reset(seed=SEED), together[0])
 
 
-def test_a_seed_starts_over_whatever_came_before(together):
+def test_a_seed_restarts_the_episodes_whatever_came_before(together):
     envs = make_vec(20)
     envs.reset(seed=77)
     list(steps_of(envs, random_actions(70, 20)))
-    told = [envs.reset(seed=SEED)]
+    results = [envs.reset(seed=SEED)]
     for noise in NOISE[:, :20]:
-        told.append(envs.step(push_blindly(told[-1][0], noise)))
-    for few, many in zip(told, together[: EPISODE + 1], strict=True):
-        for world in range(20):
-            assert_same(one_world(few, world), one_world(many, world))
+        results.append(envs.step(push_blindly(results[-1][0], noise)))
+    assert_worlds_are_same(results, together[: EPISODE + 1], np.arange(20))
 
 
-# --- starting anew ------------------------------------------------------------------------------
+def test_a_world_whose_seed_is_none_starts_its_next_episode():
+    """As in Gymnasium's vector of single environments."""
+    native, sync = make_vec(4), make_vec(4, vectorization_mode="sync")
+    for seed in (SEED, [7, None, SEED, None], [None] * 4, None):
+        assert_same(native.reset(seed=seed), sync.reset(seed=seed))
+        for actions in random_actions(3, 4):
+            assert_same(native.step(actions), sync.step(actions))
+
+
+def test_a_world_that_never_had_a_seed_draws_one():
+    first, second = (make_vec(5).reset(seed=[None, 3, None, None, 3])[0] for _ in range(2))
+    goals = {goal.tobytes() for goal in [*first["desired_goal"], *second["desired_goal"]]}
+    assert len(goals) == 7
+    np.testing.assert_array_equal(first["desired_goal"][1], second["desired_goal"][4])
+
+
+def test_a_reset_of_the_other_worlds_leaves_seeded_ones_their_seeds():
+    envs = make_vec(3, autoreset_mode=DISABLED)
+    masks = np.array([True, False, False]), np.array([False, True, True])
+    envs.reset(seed=[5, None, None], options={"reset_mask": masks[0]})
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step(np.zeros((3, 3)))
+    envs.reset(options={"reset_mask": masks[1]})
+    alone = RigidEnv()
+    alone.reset(seed=5)
+    assert_same(one_world(envs.reset(), 0), alone.reset())
+
+
+# --- autoreset ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("reward_type", REWARDS)
-def test_the_native_environment_says_what_gymnasiums_says(mode, reward_type):
-    """Episodes end at different times: some by success, others by time."""
+def test_the_native_environment_returns_what_gymnasiums_vector_returns(mode, reward_type):
+    """Episodes end at different times: some by success, others by their length."""
     kwargs = {"reward_type": reward_type, "terminate_on_success": True}
     native = make_vec(4, autoreset_mode=mode, **kwargs)
     vector_kwargs = {"autoreset_mode": mode}
@@ -217,7 +246,7 @@ def test_the_native_environment_says_what_gymnasiums_says(mode, reward_type):
                 put_cubes_on_goals(sync.envs[3].unwrapped)
         ours, theirs = native.step(actions), sync.step(actions)
         ended = ours[2] | ours[3]
-        # Gymnasium leaves zeros in final_info where nothing ended, which its mask says
+        # where no episode ended, final_info of Gymnasium has zeros, and its mask is False
         np.testing.assert_equal(_masked(ours), _masked(theirs))
         if mode is DISABLED and ended.any():
             options = {"reset_mask": ended}
@@ -232,16 +261,16 @@ def _masked(result):
 
 
 def _masked_info(info):
-    told = {}
+    entries = {}
     for name, value in info.items():
         mask = info.get(f"_{name}")
         if name.startswith("_"):
-            told[name] = value
+            entries[name] = value
         elif isinstance(value, dict):
-            told[name] = _masked_info(value)
+            entries[name] = _masked_info(value)
         else:
-            told[name] = value[mask].tolist()
-    return told
+            entries[name] = value[mask].tolist()
+    return entries
 
 
 def test_next_step_resets_in_the_step_after_the_end_and_ignores_its_action():
@@ -259,7 +288,7 @@ def test_next_step_resets_in_the_step_after_the_end_and_ignores_its_action():
     assert not (terminated | truncated).any()
 
 
-def test_same_step_gives_the_last_observation_and_info_apart():
+def test_same_step_returns_the_last_observation_and_info_separately():
     envs = make_vec(3, autoreset_mode=SAME_STEP, terminate_on_success=True)
     goals = envs.reset(seed=0)[0]["desired_goal"]
     solved = np.array([False, True, False])
@@ -280,7 +309,7 @@ def test_same_step_gives_the_last_observation_and_info_apart():
     np.testing.assert_array_equal(observation["desired_goal"][[0, 2]], goals[[0, 2]])
 
 
-def test_same_step_says_nothing_of_last_things_while_no_episode_ends():
+def test_same_step_returns_no_final_entries_while_no_episode_ends():
     envs = make_vec(3, autoreset_mode=SAME_STEP)
     envs.reset(seed=0)
     assert not [name for name in envs.step(np.zeros((3, 3)))[4] if "final" in name]
@@ -313,8 +342,7 @@ def test_a_partial_reset_leaves_the_other_worlds_alone(seed):
     assert_same(one_world((observation, info), 3), expected)
     for actions in random_actions(30, 5, seed=1):
         one, other = envs.step(actions), undisturbed.step(actions)
-        for world in np.flatnonzero(~mask):
-            assert_same(one_world(one, world), one_world(other, world))
+        assert_same(some_worlds(one, ~mask), some_worlds(other, ~mask))
         assert_same(one_world(one, 3)[0], alone.step(actions[3])[0])
     assert one[3].tolist() == (~mask).tolist()
 
@@ -324,7 +352,7 @@ def test_a_partial_reset_leaves_the_other_worlds_alone(seed):
 
 @pytest.mark.parametrize("mode", [NEXT_STEP, SAME_STEP])
 @pytest.mark.parametrize("env_id", IDS)
-def test_saving_and_going_back_repeats_to_the_last_bit(env_id, mode):
+def test_a_restored_state_continues_bitwise_identically(env_id, mode):
     envs = make_vec(70, env_id, autoreset_mode=mode, max_episode_steps=EPISODE)
     envs.reset(seed=0)
     actions = random_actions(120, 70, size=envs.single_action_space.shape[0])
@@ -337,7 +365,7 @@ def test_saving_and_going_back_repeats_to_the_last_bit(env_id, mode):
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 @pytest.mark.parametrize("env_id", IDS)
-def test_a_copy_goes_on_by_itself_to_the_last_bit(env_id, clone):
+def test_a_copy_continues_bitwise_identically(env_id, clone):
     envs = make_vec(130, env_id, threads=2)
     envs.reset(seed=0)
     actions = random_actions(60, 130, size=envs.single_action_space.shape[0])
@@ -348,16 +376,18 @@ def test_a_copy_goes_on_by_itself_to_the_last_bit(env_id, clone):
 
 
 @pytest.mark.parametrize("env_id", [PUSH, THROW])
-def test_guides_tell_the_way_to_the_goal_after_all_else(env_id):
+def test_the_task_guide_is_appended_to_the_observation(env_id):
     kwargs = {"randomize": {"mass": (0.5, 2.0)}, "observe_parameters": True}
-    plain, envs = (make_vec(7, env_id, guided=guided, **kwargs) for guided in (False, True))
+    plain, envs = (
+        make_vec(7, env_id, observe_task_guide=guide, **kwargs) for guide in (False, True)
+    )
     before, (observation, _) = plain.reset(seed=0)[0], envs.reset(seed=0)
     split = before["observation"].shape[1]
     np.testing.assert_array_equal(observation["observation"][:, :split], before["observation"])
     to_go = observation["desired_goal"] - observation["achieved_goal"]
     np.testing.assert_array_equal(observation["observation"][:, split:], to_go)
-    single = make(env_id, guided=True, **kwargs)
+    single = make(env_id, observe_task_guide=True, **kwargs)
     assert single.observation_space == envs.single_observation_space
     assert envs.observation_space.contains(observation)
-    with pytest.raises(TypeError, match="guided must be"):
-        make(env_id, guided="yes")
+    with pytest.raises(TypeError, match="observe_task_guide must be"):
+        make(env_id, observe_task_guide="yes")

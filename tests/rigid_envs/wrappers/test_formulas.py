@@ -1,4 +1,4 @@
-"""Each wrapper pays by its formula, in one world as in many, and compute_reward pays the same."""
+"""Each wrapper follows its formula, for single and vector environments and compute_reward."""
 
 import copy
 import pickle
@@ -27,7 +27,6 @@ from tests.rigid_envs.rollout import (
 )
 
 STAGES = [Stage("reach", -0.4, -0.1), Stage("distance", -0.4, -0.05, 2.0), Stage("success", 0, 1)]
-# by names of what to wrap in, from the inside out
 ARGUMENTS = {
     "StagedReward": {"stages": STAGES},
     "PotentialShaping": {"potential": goal_potential, "gamma": 0.9},
@@ -36,10 +35,10 @@ ARGUMENTS = {
     "SuccessBonus": {"bonus": 5.0},
     "TimePenalty": {"penalty": 0.7},
     "ScaleReward": {"scale": 0.3},
-    "ClipReward": {"low": -0.9, "high": -0.1},
+    "BoundReward": {"low": -0.9, "high": -0.1},
 }
-OF_GOALS = ["SuccessBonus", "TimePenalty", "ScaleReward", "ClipReward"]
-# the same twice too, which must not take the other's terms
+GOAL_RULES = ["SuccessBonus", "TimePenalty", "ScaleReward", "BoundReward"]
+# names of wrappers from the inside out; a second one of a kind must not overwrite the terms
 STACKS = [
     *((name,) for name in ARGUMENTS),
     tuple(ARGUMENTS),
@@ -47,7 +46,7 @@ STACKS = [
     ("PotentialShaping", "SmoothnessPenalty", "PotentialShaping"),
 ]
 MODES = list(AutoresetMode)
-PAGE = (Path(__file__).parents[2] / "docs" / "rewards.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "rewards.md").read_text()
 
 
 def wrapped(env, names, namespace=wrappers):
@@ -64,7 +63,7 @@ def wrapped_vec(worlds, names, **kwargs):
 
 
 def expected(name, reward, before, after, actions, last_actions, info):
-    """Each wrapper's formula once more, written plainly, [n]."""
+    """The formula of each wrapper, written independently, [n]."""
     solved = distance(after["achieved_goal"], after["desired_goal"]) <= 0.05
     if name == "StagedReward":
         reach = np.where(solved, 1, np.clip((info["reach"] + 0.4) / 0.3, 0, 1))
@@ -77,13 +76,13 @@ def expected(name, reward, before, after, actions, last_actions, info):
         "SuccessBonus": reward + 5 * solved,
         "TimePenalty": np.where(solved, reward, reward - 0.7),
         "ScaleReward": 0.3 * reward,
-        "ClipReward": np.clip(reward, -0.9, -0.1),
+        "BoundReward": np.clip(reward, -0.9, -0.1),
     }[name]
 
 
 @pytest.mark.parametrize("kind", REWARDS)
 @pytest.mark.parametrize("name", ARGUMENTS)
-def test_a_wrapper_pays_by_its_formula_and_changes_nothing_else(name, kind):
+def test_a_wrapper_follows_its_formula_and_changes_nothing_else(name, kind):
     plain = make_vec(20, reward_type=kind)
     envs = wrapped_vec(20, [name], reward_type=kind)
     before, _ = plain.reset(seed=0)
@@ -108,17 +107,17 @@ def test_a_wrapper_pays_by_its_formula_and_changes_nothing_else(name, kind):
 @pytest.mark.parametrize(
     ("name", "terms"),
     [
-        ("StagedReward", {"stages_done", "unstaged_reward", "goals_of_terms"}),
-        ("PotentialShaping", {"shaping", "goals_of_terms"}),
+        ("StagedReward", {"stages_done", "unstaged_reward", "step_goals"}),
+        ("PotentialShaping", {"shaping", "step_goals"}),
         ("ActionPenalty", {"action_square"}),
         ("SmoothnessPenalty", {"action_change"}),
         ("SuccessBonus", {"bonus_paid"}),
         ("TimePenalty", {"time_charged"}),
         ("ScaleReward", {"unscaled_reward"}),
-        ("ClipReward", {"unclipped_reward"}),
+        ("BoundReward", {"unbounded_reward"}),
     ],
 )
-def test_the_info_of_a_step_tells_the_raw_terms(name, terms):
+def test_the_info_of_a_step_contains_the_raw_terms(name, terms):
     env = wrapped(gym.make(PUSH), [name])
     first = env.reset(seed=0)[1]
     assert set(env.step(np.zeros(3))[4]) - set(first) == terms
@@ -128,7 +127,7 @@ def test_the_info_of_a_step_tells_the_raw_terms(name, terms):
     assert set(info) - set(first) - {f"_{key}" for key in info} == terms
 
 
-def test_a_stage_pays_nothing_before_those_ahead_of_it_are_complete():
+def test_a_stage_pays_nothing_before_all_stages_before_it_are_complete():
     envs = wrappers.vector.StagedReward(
         make_vec(3), [Stage("reach", -0.5, -0.0001), Stage("distance", -0.4, -0.05)]
     )
@@ -155,24 +154,24 @@ def test_one_stage_of_success_is_the_sparse_reward(terminate):
 # --- one world and many -------------------------------------------------------------------------
 
 
-def told_where_masked(result):
+def masked_entries(result):
     *head, info = result
     return *head, _masked(info)
 
 
 def _masked(info):
-    told = {}
+    entries = {}
     for name, value in info.items():
         if isinstance(value, dict):
-            told[name] = _masked(value)
+            entries[name] = _masked(value)
         else:
-            told[name] = value if name.startswith("_") else value[info[f"_{name}"]].tolist()
-    return told
+            entries[name] = value if name.startswith("_") else value[info[f"_{name}"]].tolist()
+    return entries
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("names", STACKS, ids="+".join)
-def test_a_vector_wrapper_says_what_wrapped_single_environments_say(names, mode):
+def test_a_vector_wrapper_returns_what_wrapped_single_environments_return(names, mode):
     """Episodes end at different times, some by success and others by time."""
     kwargs = {"terminate_on_success": True, "reward_type": "dense"}
     native = wrapped_vec(4, names, autoreset_mode=mode, **kwargs)
@@ -192,7 +191,7 @@ def test_a_vector_wrapper_says_what_wrapped_single_environments_say(names, mode)
             if step == 61:
                 put_cubes_on_goals(sync.envs[3].unwrapped)
         ours, theirs = native.step(actions), sync.step(actions)
-        np.testing.assert_equal(told_where_masked(ours), told_where_masked(theirs))
+        np.testing.assert_equal(masked_entries(ours), masked_entries(theirs))
         ended = ours[2] | ours[3]
         if mode is AutoresetMode.DISABLED and ended.any():
             for one in (native, sync):
@@ -201,7 +200,7 @@ def test_a_vector_wrapper_says_what_wrapped_single_environments_say(names, mode)
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 @pytest.mark.parametrize("many", [False, True], ids=["single", "vector"])
-def test_a_copy_goes_on_by_itself_to_the_last_bit(many, clone):
+def test_a_copy_continues_bitwise_identically(many, clone):
     names, actions = tuple(ARGUMENTS), random_actions(40, 3)
     env = wrapped_vec(3, names) if many else wrapped(gym.make(PUSH), names)
     actions = actions if many else actions[:, 0]
@@ -211,7 +210,7 @@ def test_a_copy_goes_on_by_itself_to_the_last_bit(many, clone):
     assert_same(list(steps_of(env, actions[20:])), list(steps_of(twin, actions[20:])))
 
 
-def test_saving_and_going_back_repeats_to_the_last_bit():
+def test_a_restored_state_continues_bitwise_identically():
     envs = wrapped_vec(5, tuple(ARGUMENTS))
     envs.reset(seed=0)
     actions = random_actions(80, 5)
@@ -230,7 +229,7 @@ def test_gym_make_builds_a_wrapped_environment_from_its_spec():
     assert_same(again.step(np.ones(3)), env.step(np.ones(3)))
 
 
-# --- every task, and what is told of it ---------------------------------------------------------
+# --- every task, and its documentation -----------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -256,11 +255,11 @@ def test_every_task_can_be_wrapped(env_id, stage):
 
 @pytest.mark.parametrize("env_id", list(ENVIRONMENTS))
 def test_the_documentation_names_every_term(env_id):
-    task = ENVIRONMENTS[env_id][0].capitalize()
+    task = ENVIRONMENTS[env_id]["task"].capitalize()
     rows = [line for line in PAGE.splitlines() if line.startswith(f"| {task} |")]
     named = {term for row in rows for term in re.findall(r"`(\w+)`", row.split("|")[2])}
-    told = {name for name in make_vec(1, env_id).reset(seed=0)[1] if not name.startswith("_")}
-    assert told == named | {"is_success", "success", "out_of_bounds"}
+    entries = {name for name in make_vec(1, env_id).reset(seed=0)[1] if name[0] != "_"}
+    assert entries - {"step_goals"} == named | {"is_success", "success", "out_of_bounds"}
 
 
 def test_the_examples_of_the_documentation_run():

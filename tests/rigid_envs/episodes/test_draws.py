@@ -11,7 +11,7 @@ ZERO = np.zeros(N, dtype=np.int64)
 
 
 def by_definition(seed: int, episode: int, count: int) -> list[float]:
-    """The same, from splitmix64's definition in whole numbers of Python."""
+    """The same numbers from the definition of splitmix64, in Python integers."""
     golden, full = 0x9E3779B97F4A7C15, 2**64 - 1
 
     def mix(x):
@@ -33,7 +33,7 @@ def by_definition(seed: int, episode: int, count: int) -> list[float]:
         (2**31 - 1, 123, [0.6471315915051123, 0.24931825620194636, 0.1438531776469809]),
     ],
 )
-def test_draws_are_those_of_every_release(seed, episode, golden):
+def test_draws_never_change_between_releases(seed, episode, golden):
     drawn = uniform(np.array([seed]), np.array([episode]), 3)
     np.testing.assert_array_equal(drawn, [golden])
     np.testing.assert_array_equal(drawn, [by_definition(seed, episode, 3)])
@@ -47,7 +47,7 @@ def test_a_row_does_not_depend_on_its_batch():
     np.testing.assert_array_equal(uniform(SEEDS[5:6], episodes[5:6], 15), together[5:6])
 
 
-def test_more_draws_leave_the_first_ones_alone():
+def test_drawing_more_numbers_does_not_change_the_first_ones():
     np.testing.assert_array_equal(uniform(SEEDS, ZERO, 3), uniform(SEEDS, ZERO, 15)[:, :3])
 
 
@@ -80,6 +80,6 @@ def test_neighbours_are_uncorrelated(lag):
         assert abs(np.corrcoef(a, b)[0, 1]) < 5 / np.sqrt(N), name
 
 
-def test_no_two_episodes_are_alike():
+def test_no_two_episodes_are_the_same():
     seeds, episodes = (x.ravel() for x in np.meshgrid(np.arange(1000), np.arange(100)))
     assert len(np.unique(uniform(seeds, episodes, 1))) == len(seeds)

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from physics import PRESETS as FIDELITIES
-from rigid_envs.tasks.throw import ASIDE, FARTHEST, GRAVITY, NEAREST, RADIUS, Throw
+from rigid_envs.tasks.throw import (
+    GRAVITY,
+    MAX_TARGET_ANGLE,
+    MAX_TARGET_DISTANCE,
+    MIN_TARGET_DISTANCE,
+    RADIUS,
+    Throw,
+)
 from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
 
@@ -19,18 +26,18 @@ def test_targets_are_out_of_reach_and_none_is_solved_at_the_start():
     assert not info["is_success"].any()
     goal = observation["desired_goal"].astype(float)
     far = np.hypot(goal[:, 0], goal[:, 1])
-    assert NEAREST - 1e-6 <= far.min() < NEAREST + 0.01
-    assert FARTHEST - 0.01 < far.max() <= FARTHEST + 1e-6
-    assert np.abs(np.arctan2(goal[:, 1], goal[:, 0])).max() <= ASIDE + 1e-6
+    assert MIN_TARGET_DISTANCE - 1e-6 <= far.min() < MIN_TARGET_DISTANCE + 0.01
+    assert MAX_TARGET_DISTANCE - 0.01 < far.max() <= MAX_TARGET_DISTANCE + 1e-6
+    assert np.abs(np.arctan2(goal[:, 1], goal[:, 0])).max() <= MAX_TARGET_ANGLE + 1e-6
     assert far.min() > np.hypot(*Throw.hand.high[:2]) + 0.1
     # as many in the outer half of the area as in the inner one
-    middle = np.sqrt(0.5 * (NEAREST**2 + FARTHEST**2))
+    middle = np.sqrt(0.5 * (MIN_TARGET_DISTANCE**2 + MAX_TARGET_DISTANCE**2))
     assert abs((far > middle).mean() - 0.5) < 0.03
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_ball_that_is_held_stays_and_does_not_creep(fidelity):
-    envs = make_vec(1, THROW, fidelity=fidelity, max_episode_steps=None)
+    envs = make_vec(1, THROW, fidelity=fidelity, max_episode_steps=-1)
     envs.reset(seed=0)
     places = []
     for observation, *_, info in steps_of(envs, np.tile(HOLD, (300, 1, 1))):
@@ -42,7 +49,7 @@ def test_a_ball_that_is_held_stays_and_does_not_creep(fidelity):
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_the_first_touch_counts_and_not_where_the_ball_rolls(fidelity):
-    envs = make_vec(8, THROW, fidelity=fidelity, max_episode_steps=None)
+    envs = make_vec(8, THROW, fidelity=fidelity, max_episode_steps=-1)
     envs.reset(seed=0)
     swing = np.tile([0.3, 0.1, 0.0, -1.0], (5, 8, 1))
     letting_go = np.tile([0.3, 0.1, 0.0, 1.0], (2, 8, 1))
@@ -69,8 +76,8 @@ def test_the_first_touch_counts_and_not_where_the_ball_rolls(fidelity):
     assert np.linalg.norm(ball - landed, axis=1).min() > 0.02  # it rolled on
 
 
-def test_aim_is_the_miss_of_a_ball_let_go_now():
-    envs = make_vec(16, THROW, reward_type="dense", max_episode_steps=None)
+def test_aim_is_the_error_of_a_ball_released_now():
+    envs = make_vec(16, THROW, reward_type="dense", max_episode_steps=-1)
     observation, info = envs.reset(seed=3)
     free = np.zeros(16, dtype=bool)
     for _ in range(EPISODE):
@@ -86,7 +93,7 @@ def test_aim_is_the_miss_of_a_ball_let_go_now():
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_blind_steps_stay_physical(fidelity, stress):
-    """100,000 random and bang-bang actions, and a million under stress."""
+    """100,000 random and bang-bang actions, a million with `make stress`."""
     envs = make_vec(512, THROW, fidelity=fidelity)
     envs.reset(seed=0)
     world = envs._runner.world
@@ -112,7 +119,7 @@ def test_a_random_policy_hardly_ever_solves_it(fidelity):
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_scripted_controller_hits(fidelity, stress):
-    """1,000 seeds, and 200 at accurate but under stress."""
+    """1,000 seeds; 200 at accurate, except with `make stress`."""
     worlds = 200 if fidelity == "accurate" and not stress else 1000
     envs = make_vec(worlds, THROW, fidelity=fidelity)
     observation, _ = envs.reset(seed=0)

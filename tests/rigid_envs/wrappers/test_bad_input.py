@@ -1,4 +1,4 @@
-"""Wrappers on the wrong kind, and bad arguments, are named clearly; nothing is lost by it."""
+"""Wrong environments and invalid arguments raise clear errors, and change nothing."""
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,7 @@ from tests.rigid_envs.rollout import (
     random_actions,
     steps_of,
 )
-from tests.rigid_envs.test_wrappers import ARGUMENTS, wrapped, wrapped_vec
+from tests.rigid_envs.wrappers.test_formulas import ARGUMENTS, wrapped, wrapped_vec
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
@@ -36,7 +36,7 @@ def test_the_wrong_kind_of_environment_names_the_right_wrapper(name):
 
 
 @pytest.mark.parametrize("thing", [None, 3, PUSH, make])
-def test_what_is_no_environment_is_named(thing):
+def test_an_object_that_is_no_environment_is_named(thing):
     with pytest.raises(TypeError, match=r"wraps a gymnasium Env, got \w+$"):
         wrappers.ScaleReward(thing, 2.0)
     with pytest.raises(TypeError, match=r"wraps a gymnasium VectorEnv, got \w+$"):
@@ -44,7 +44,7 @@ def test_what_is_no_environment_is_named(thing):
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
-def test_environments_without_goals_are_refused(name):
+def test_environments_without_goals_raise(name):
     with pytest.raises(TypeError, match=r"environments with goals.*CartPole-v1.*TransformReward"):
         wrapped(gym.make("CartPole-v1"), [name])
     with pytest.raises(TypeError, match=r"environments with goals.*CartPole-v1"):
@@ -53,16 +53,16 @@ def test_environments_without_goals_are_refused(name):
         wrapped(FilterObservation(gym.make(PUSH), ["observation"]), [name])
 
 
-def test_an_environment_that_does_not_tell_success_is_refused_where_success_counts():
+def test_an_environment_without_a_threshold_raises_if_the_rule_needs_success():
     class Foreign(gym.Env):
         observation_space, action_space = make().observation_space, gym.spaces.Discrete(3)
 
         def compute_reward(self, achieved, desired, info):
             return 0.0
 
-    with pytest.raises(TypeError, match=r"SuccessBonus .* attribute `reward` .* Foreign has not"):
+    with pytest.raises(TypeError, match=r"SuccessBonus .* `reward` .* Foreign does not have"):
         wrappers.SuccessBonus(Foreign(), 1.0)
-    with pytest.raises(TypeError, match=r"ActionPenalty .* actions are a Box, got Discrete\(3\)"):
+    with pytest.raises(TypeError, match=r"ActionPenalty .* space is a Box, got Discrete\(3\)"):
         wrappers.ActionPenalty(Foreign(), 1.0)
     wrappers.ScaleReward(Foreign(), 2.0)
 
@@ -84,7 +84,7 @@ def test_an_environment_that_does_not_tell_success_is_refused_where_success_coun
         ("SuccessBonus", {"bonus": -0.1}, ValueError, "bonus must be .*at least 0, got -0.1"),
         ("TimePenalty", {"penalty": True}, TypeError, "penalty must be a number, got True"),
         ("ScaleReward", {"scale": 0}, ValueError, "scale must be finite and above 0, got 0"),
-        ("ClipReward", {"low": 1, "high": 0}, ValueError, r"high must be above low, 1\.0, got 0"),
+        ("BoundReward", {"low": 1, "high": 0}, ValueError, r"high must be above low, 1\.0, got 0"),
         ("PotentialShaping", {"potential": 3, "gamma": 0.9}, TypeError, "potential must be call"),
         (
             "PotentialShaping",
@@ -92,7 +92,7 @@ def test_an_environment_that_does_not_tell_success_is_refused_where_success_coun
             ValueError,
             "gamma must be finite and at least 0 and at most 1, got 98",
         ),
-        ("StagedReward", {"stages": []}, ValueError, "stages must be one Stage at least"),
+        ("StagedReward", {"stages": []}, ValueError, "stages must contain at least one Stage"),
         (
             "StagedReward",
             {"stages": "reach"},
@@ -120,6 +120,7 @@ def test_bad_arguments_are_named(space, name, arguments, error, match):
         (("reach", 0.0, np.inf), "Stage.done must be finite, got inf"),
         (("reach", 1.0, 1.0), "Stage.done must differ from Stage.start, got 1.0"),
         (("reach", 0.0, 1.0, 0.0), "Stage.weight must be finite and above 0"),
+        (("time", 0.0, 1.0), "Stage.term must not be 'time'"),
     ],
 )
 def test_bad_stages_are_named(arguments, match):
@@ -127,22 +128,22 @@ def test_bad_stages_are_named(arguments, match):
         Stage(*arguments)
 
 
-def test_a_stage_of_a_term_that_is_not_there_is_named_at_the_reset():
+def test_a_stage_of_an_unknown_term_is_named_at_the_reset():
     for space, env in ((wrappers, gym.make(PUSH)), (wrappers.vector, make_vec(2))):
         staged = space.StagedReward(env, [Stage("reech", 0.0, 1.0)])
-        with pytest.raises(ValueError, match=r"reads the term 'reech' .* has \[.*'reach'\]"):
+        with pytest.raises(ValueError, match=r"needs the term 'reech' .* has \[.*'reach'\]"):
             staged.reset(seed=0)
 
 
 @pytest.mark.parametrize("value", [np.zeros(3), "high", np.nan])
-def test_a_potential_that_gives_no_number_for_each_world_is_named(value):
+def test_a_potential_that_returns_no_number_per_world_is_named(value):
     envs = wrappers.vector.PotentialShaping(make_vec(2), lambda observation: value, 0.9)
     with pytest.raises(ValueError, match=r"potential\(observation\) must be"):
         envs.reset(seed=0)
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
-def test_a_step_before_the_wrappers_reset_moves_nothing(name):
+def test_a_step_before_the_wrappers_reset_changes_nothing(name):
     envs = make_vec(2)
     envs.reset(seed=0)
     late, before = wrapped(envs, [name], wrappers.vector), envs.get_state()
@@ -154,8 +155,8 @@ def test_a_step_before_the_wrappers_reset_moves_nothing(name):
         env.step(np.zeros(3))
 
 
-def test_bad_actions_lose_nothing():
-    """Neither the environment nor a wrapper's memory of the last step moves."""
+def test_invalid_actions_change_nothing():
+    """Neither the environment nor a wrapper's memory of the last step changes."""
     envs, twin = (wrapped_vec(2, tuple(ARGUMENTS)) for _ in range(2))
     actions = random_actions(10, 2)
     for one in (envs, twin):
@@ -185,12 +186,12 @@ def test_the_same_wrapper_on_single_environments_and_their_vector_is_refused():
     )
     envs = wrappers.vector.ActionPenalty(sync, **kwargs)
     envs.reset(seed=0)
-    with pytest.raises(ValueError, match=r"can't tell 'action_square' .* has it already"):
+    with pytest.raises(ValueError, match=r"cannot add 'action_square' .* already has this entry"):
         envs.step(np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
-def test_a_vector_that_names_no_autoreset_mode_is_refused(name):
+def test_a_vector_without_an_autoreset_mode_raises(name):
     envs = make_vec(2)
     envs.metadata = {}
     with pytest.raises(ValueError, match=r'metadata\["autoreset_mode"\] must be .* got None'):

@@ -183,7 +183,7 @@ def test_the_shadow_lies_on_the_ground_away_from_the_light():
 
 def test_a_goal_tints_its_disc_and_hangs_a_ball_at_its_height():
     goal = Goal((0.05, 0.05, 0.15), 0.03, GREEN)
-    frame, plain = draw(signs=[goal]), draw()
+    frame, plain = draw(markers=[goal]), draw()
     ball, disc = pixel_of(goal.position), pixel_of((0.04, 0.06, 0.0))
     beside = pixel_of((0.05, -0.02, 0.0))
     for pixel in (ball, disc):
@@ -195,17 +195,17 @@ def test_a_goal_tints_its_disc_and_hangs_a_ball_at_its_height():
 def test_a_solid_shows_through_the_ball_of_its_goal():
     position = (0.0, 0.0, 0.02)
     goal, pixel = Goal(position, 0.05, GREEN), pixel_of(position)
-    alone, solved = draw(signs=[goal]), draw(item(CUBE, position), signs=[goal])
+    alone, solved = draw(markers=[goal]), draw(item(CUBE, position), markers=[goal])
     assert int(solved[pixel][2]) < alone[pixel][2] - 30  # the cube takes the ground's blue
 
 
 def test_a_ghost_tints_its_place_and_shows_its_edges_through_a_solid():
     place = Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), GREEN)
-    empty, plain = draw(signs=[place]), draw()
+    empty, plain = draw(markers=[place]), draw()
     tint = empty[pixel_of((0.0, 0.0, 0.04))].astype(int) - plain[pixel_of((0.0, 0.0, 0.04))]
     assert tint[1] > max(tint[0], tint[2]) + 15
     wall = item(Box((0.05, 0.001, 0.05)), (0.0, -0.04, 0.05))
-    hidden, alone = draw(wall, signs=[place]), draw(wall)
+    hidden, alone = draw(wall, markers=[place]), draw(wall)
     corner = np.array([0.02, -0.02, 0.04])
     assert shows(hidden, pixel_of(corner), GREEN)
     assert shows(alone, pixel_of(corner), RED)
@@ -214,11 +214,11 @@ def test_a_ghost_tints_its_place_and_shows_its_edges_through_a_solid():
 def test_a_cube_in_its_place_keeps_its_colour():
     place, cube = Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), RED), item(CUBE, (0.0, 0.0, 0.02))
     pixel = pixel_of((0.0, 0.0, 0.04))
-    np.testing.assert_array_equal(draw(cube, signs=[place])[pixel], draw(cube)[pixel])
+    np.testing.assert_array_equal(draw(cube, markers=[place])[pixel], draw(cube)[pixel])
 
 
 def test_a_mark_lies_on_the_ground_under_its_position():
-    frame = draw(signs=[Mark((0.05, 0.0, 0.02), 0.02, RED)])
+    frame = draw(markers=[Mark((0.05, 0.0, 0.02), 0.02, RED)])
     assert shows(frame, pixel_of((0.05, 0.0, 0.0)), RED)
     assert is_grey(frame, pixel_of((0.05, 0.03, 0.0)))
 
@@ -261,7 +261,7 @@ def test_a_caption_changes_the_top_left_corner_only():
 def test_what_lies_behind_the_camera_is_not_drawn(distance):
     place = distance * Camera().eye * (1.0, 1.0, 1.0 / distance)
     shapes = (Sphere(0.02), CUBE, Capsule(0.02, 0.02))
-    extras = {"signs": [Goal(place, 0.05)], "forces": [Arrow(place, (0.0, 0.1, 0.0))]}
+    extras = {"markers": [Goal(place, 0.05)], "forces": [Arrow(place, (0.0, 0.1, 0.0))]}
     np.testing.assert_array_equal(draw(*[item(s, place) for s in shapes], **extras), draw())
 
 
@@ -302,7 +302,7 @@ import os
 before = dict(os.environ)
 from rigid_envs.rendering.renderer import Goal, Renderer
 renderer = Renderer(32, 24)
-assert renderer.frame([], signs=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
+assert renderer.frame([], markers=[Goal((0, 0, 0.02), 0.05)], caption="x").shape == (24, 32, 3)
 import pygame
 assert not pygame.display.get_init()
 sdl = lambda env: {k: v for k, v in env.items() if "SDL" in k or k == "DISPLAY"}
@@ -351,7 +351,7 @@ def test_a_pose_that_is_none_is_named(position, orientation, field):
         item(CUBE, position, orientation=orientation)
 
 
-def test_a_sign_or_force_that_is_not_finite_is_named():
+def test_a_marker_or_force_that_is_not_finite_is_named():
     with pytest.raises(ValueError, match=r"Goal\.position"):
         Goal((np.inf, 0.0, 0.0), 0.05)
     with pytest.raises(ValueError, match=r"Goal\.radius"):

@@ -1,4 +1,4 @@
-"""Shaping by a potential adds the same to every return from a state: no best policy changes."""
+"""Potential shaping adds the same to every return from a state: optimal policies stay the same."""
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +21,7 @@ MODES = list(AutoresetMode)
 
 
 def bumpy(observation):
-    """A potential of all that is seen, large enough to drown the reward."""
+    """A potential of the whole observation, much larger than the reward."""
     return 50.0 * np.sin(40.0 * observation["observation"].astype(float)).sum(axis=-1)
 
 
@@ -40,7 +40,7 @@ def returns(env, gamma, actions):
 @pytest.mark.parametrize("gamma", GAMMAS)
 @pytest.mark.parametrize("potential", [goal_potential, bumpy])
 @pytest.mark.parametrize("steps", [1, 7, EPISODE])  # an episode cut short, or truncated
-def test_returns_differ_by_the_potentials_of_both_ends_whatever_is_done(potential, gamma, steps):
+def test_returns_differ_by_the_potentials_of_both_ends_for_any_policy(potential, gamma, steps):
     for seed in range(4):
         actions = random_actions(steps, 1, seed)[:, 0]
         plain = returns(gym.make(PUSH, reward_type="dense"), gamma, actions)
@@ -65,7 +65,7 @@ def test_a_terminal_state_has_no_potential(gamma):
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("terminate", [False, True])
 def test_shaping_never_reaches_across_episodes(mode, terminate):
-    """World by world, what every episode of a vector environment paid telescopes."""
+    """The shaping of each episode of a vector environment telescopes."""
     worlds, gamma = 6, 0.9
     envs = wrappers.vector.PotentialShaping(
         make_vec(worlds, autoreset_mode=mode, terminate_on_success=terminate), bumpy, gamma
@@ -73,7 +73,7 @@ def test_shaping_never_reaches_across_episodes(mode, terminate):
     noise = random_actions(130, worlds)
     observation, _ = envs.reset(seed=0)
     start, total, length = bumpy(observation), np.zeros(worlds), np.zeros(worlds, dtype=int)
-    begun, episodes = np.zeros(worlds, dtype=bool), 0
+    started, episodes = np.zeros(worlds, dtype=bool), 0
     for step in range(130):
         if step in (20, 50, 51, 90):
             put_cubes_on_goals(envs.unwrapped, np.arange(worlds) % 3 == step % 3)
@@ -84,7 +84,7 @@ def test_shaping_never_reaches_across_episodes(mode, terminate):
         final = info.get("final_info", {})
         shaping = info.get("shaping", np.zeros(worlds))
         for i in range(worlds):
-            if begun[i]:  # NEXT_STEP: this step was the reset
+            if started[i]:  # NEXT_STEP: this step was the reset
                 assert reward[i] == 0.0
                 assert "_shaping" not in info or not info["_shaping"][i]
                 start[i], total[i], length[i] = after[i], 0.0, 0
@@ -100,7 +100,7 @@ def test_shaping_never_reaches_across_episodes(mode, terminate):
                 assert total[i] == pytest.approx(gained, rel=1e-9, abs=1e-9)
                 start[i], total[i], length[i] = after[i], 0.0, 0
         if mode is AutoresetMode.NEXT_STEP:
-            begun = ended
+            started = ended
         if mode is AutoresetMode.DISABLED and ended.any():
             observation, _ = envs.reset(options={"reset_mask": ended.copy()})
             start = np.where(ended, bumpy(observation), start)
@@ -124,7 +124,7 @@ def test_a_reset_of_some_worlds_leaves_the_others_shaping_alone():
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_reset_between_the_end_and_the_next_step_begins_a_paid_episode(mode):
+def test_a_reset_between_the_end_and_the_next_step_starts_a_shaped_episode(mode):
     envs = wrappers.vector.PotentialShaping(
         make_vec(3, autoreset_mode=mode, max_episode_steps=2), bumpy, 0.9
     )

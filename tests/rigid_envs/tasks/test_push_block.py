@@ -1,4 +1,4 @@
-"""Push takes a T or any Compound: as fair, as physical and as plain to see as the cube."""
+"""Push accepts a T or any Compound: fair, physical and drawn correctly, as the cube."""
 
 import functools
 import pickle
@@ -47,8 +47,8 @@ def test_blocks_start_flat_anywhere_at_any_yaw_and_unsolved():
     assert np.abs(place[:, :2]).max() <= RANGE
     np.testing.assert_allclose(turn[:, :2], 0.0, atol=1e-7)
     yaw = 2.0 * np.arctan2(turn[:, 2], turn[:, 3])
-    share = np.histogram(np.mod(yaw, 2.0 * np.pi), bins=8, range=(0.0, 2.0 * np.pi))[0] / 4000
-    np.testing.assert_allclose(share, 1 / 8, atol=0.03)
+    fraction = np.histogram(np.mod(yaw, 2.0 * np.pi), bins=8, range=(0.0, 2.0 * np.pi))[0] / 4000
+    np.testing.assert_allclose(fraction, 1 / 8, atol=0.03)
 
 
 def test_no_block_starts_on_a_post():
@@ -62,7 +62,7 @@ def test_no_block_starts_on_a_post():
     assert apart.min() > POST_RADIUS
 
 
-def test_the_names_of_what_is_seen_are_those_of_a_block():
+def test_the_names_of_the_observation_are_those_of_a_block():
     env = make(block="t")
     names = [bound[0] for bound in env._runner.bounds]
     assert "block x" in names
@@ -70,7 +70,7 @@ def test_the_names_of_what_is_seen_are_those_of_a_block():
     assert "cube x" in [bound[0] for bound in make()._runner.bounds]
 
 
-def test_a_cube_by_name_is_the_cube_to_the_bit():
+def test_block_cube_is_bitwise_identical_to_the_default():
     ends = []
     for options in ({}, {"block": "cube"}):
         envs = make_vec(20, reward_type="dense", **options)
@@ -147,21 +147,21 @@ ROLLING = Compound([(Capsule(0.02, 0.02), (0, 0, 0), (0.0, 1.0, 0.0, 1.0))])
     ("options", "error", "match"),
     [
         ({"block": "T"}, ValueError, r"block must be one of \['cube', 't'\], got 'T'"),
-        ({"block": 3}, TypeError, r"block, if none of \['cube', 't'\], must be Compound, got 3"),
+        ({"block": 3}, TypeError, r"block, if not one of \['cube', 't'\], must be Compound, got 3"),
         ({"block": Sphere(0.02)}, TypeError, "must be Compound, got Sphere"),
         ({"block": TALL}, ValueError, r"must be 0.015 to 0.08 m high, .*, got 0.12 m"),
         ({"block": FLAT}, ValueError, r"must be 0.015 to 0.08 m high, .*, got 0.01 m"),
         ({"block": WIDE}, ValueError, r"must reach at most 0.07 m .*, got 0.08"),
-        ({"block": ROLLING}, ValueError, r"must lie flat, .* at least 0.005 m within"),
-        ({"block": "t", "target_yaw": True}, ValueError, "target_yaw=True asks for the yaw of a c"),
+        ({"block": ROLLING}, ValueError, r"must lie flat: .* at least 0.005 m inside"),
+        ({"block": "t", "target_yaw": True}, ValueError, "target_yaw=True supports only the cube"),
     ],
 )
-def test_blocks_that_are_none_are_refused_by_name(options, error, match):
+def test_an_invalid_block_raises_an_error_that_says_why(options, error, match):
     with pytest.raises(error, match=match):
         make(**options)
 
 
-def test_a_compound_of_one_box_does_as_a_block():
+def test_a_compound_of_one_box_is_a_valid_block():
     block = Block.of(Compound([(Box((HALF,) * 3), (0, 0, 0))]))
     assert block.height == HALF
     assert block.radius == pytest.approx(np.sqrt(2.0) * HALF)
@@ -184,11 +184,11 @@ def test_a_picture_shows_bar_and_stem_where_they_are():
         np.testing.assert_allclose(item.orientation, from_yaw(yaw), atol=1e-12)
         assert item.color == bar.color
     renderer = Renderer(480, 480, env._runner.task.camera)
-    signs = scene_view.signs(env._runner, 0)
-    np.testing.assert_array_equal(env.render(), renderer.frame(found, signs=signs))
+    markers = scene_view.markers(env._runner, 0)
+    np.testing.assert_array_equal(env.render(), renderer.frame(found, markers=markers))
     for item in (bar, stem):
         others = [other for other in found if other is not item]
-        assert (env.render() != renderer.frame(others, signs=signs)).any(axis=2).sum() > 50
+        assert (env.render() != renderer.frame(others, markers=markers)).any(axis=2).sum() > 50
 
 
 def test_a_picture_of_particles_shows_each_sample_once_beside_its_part():

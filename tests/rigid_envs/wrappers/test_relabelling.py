@@ -1,4 +1,4 @@
-"""compute_reward of a wrapped environment pays what its steps pay, or refuses; HER builds on it."""
+"""compute_reward of a wrapped environment returns the rewards of its steps, or raises."""
 
 import gymnasium as gym
 import numpy as np
@@ -15,9 +15,9 @@ from tests.rigid_envs.rollout import (
     random_actions,
     steps_of,
 )
-from tests.rigid_envs.test_wrappers import OF_GOALS, STACKS, wrapped, wrapped_vec
+from tests.rigid_envs.wrappers.test_formulas import GOAL_RULES, STACKS, wrapped, wrapped_vec
 
-ON_INFOS = ["PotentialShaping", "ActionPenalty", "SmoothnessPenalty", "StagedReward"]
+INFO_RULES = ["PotentialShaping", "ActionPenalty", "SmoothnessPenalty", "StagedReward"]
 
 
 def goals(observation):
@@ -30,7 +30,7 @@ def half_solved(envs):
 
 @pytest.mark.parametrize("kind", REWARDS)
 @pytest.mark.parametrize("names", STACKS, ids="+".join)
-def test_a_step_pays_what_compute_reward_says_to_the_last_bit(names, kind):
+def test_a_step_returns_the_reward_of_compute_reward_bitwise(names, kind):
     env = wrapped(gym.make(PUSH, reward_type=kind), names)
     env.reset(seed=3)
     for step, action in enumerate(random_actions(EPISODE, 1)[:, 0]):
@@ -43,7 +43,7 @@ def test_a_step_pays_what_compute_reward_says_to_the_last_bit(names, kind):
 
 @pytest.mark.parametrize("kind", REWARDS)
 @pytest.mark.parametrize("names", STACKS, ids="+".join)
-def test_a_step_of_many_worlds_pays_what_compute_reward_says(names, kind):
+def test_a_step_of_many_worlds_returns_the_rewards_of_compute_reward(names, kind):
     envs = wrapped_vec(16, names, reward_type=kind)
     envs.reset(seed=3)
     for step, actions in enumerate(random_actions(EPISODE, 16)):
@@ -55,9 +55,11 @@ def test_a_step_of_many_worlds_pays_what_compute_reward_says(names, kind):
         np.testing.assert_array_equal(reward, envs.compute_reward(*goals(observation), infos))
 
 
-@pytest.mark.parametrize("names", [*((name,) for name in OF_GOALS), tuple(OF_GOALS)], ids="+".join)
+@pytest.mark.parametrize(
+    "names", [*((name,) for name in GOAL_RULES), tuple(GOAL_RULES)], ids="+".join
+)
 @pytest.mark.parametrize("info", [None, {}, [{}] * 16])
-def test_what_goals_tell_needs_no_info(names, info):
+def test_rewards_that_follow_from_goals_need_no_info(names, info):
     envs = wrapped_vec(16, names)
     envs.reset(seed=0)
     half_solved(envs)
@@ -70,7 +72,7 @@ def test_what_goals_tell_needs_no_info(names, info):
     np.testing.assert_array_equal(moved, reward[0])
 
 
-@pytest.mark.parametrize("name", OF_GOALS)
+@pytest.mark.parametrize("name", GOAL_RULES)
 def test_rewards_of_goals_are_vectorised_over_leading_axes(name):
     env = wrapped(gym.make(PUSH), [name])
     random = np.random.default_rng(0)
@@ -83,27 +85,27 @@ def test_rewards_of_goals_are_vectorised_over_leading_axes(name):
 
 
 @pytest.mark.parametrize("info", [None, {}, [{}] * 16, {"reech": 0.0}])
-@pytest.mark.parametrize("name", ON_INFOS)
-def test_what_goals_do_not_tell_is_refused_without_the_info(name, info):
+@pytest.mark.parametrize("name", INFO_RULES)
+def test_other_rewards_raise_without_the_info(name, info):
     envs = wrapped_vec(16, [name])
     observation, _ = envs.reset(seed=0)
-    with pytest.raises(ValueError, match=rf"{name}.* needs .* of the step's info, got"):
+    with pytest.raises(ValueError, match=rf"{name}.* needs .* in info, the info of the step; got"):
         envs.compute_reward(*goals(observation), info)
 
 
 @pytest.mark.parametrize("name", ["PotentialShaping", "StagedReward"])
-def test_terms_of_one_goal_are_refused_for_another(name):
+def test_terms_of_one_goal_raise_for_another(name):
     envs = wrapped_vec(4, [name])
     envs.reset(seed=0)
     observation, *_, info = envs.step(np.zeros((4, 3)))
     achieved, desired = goals(observation)
     moved = desired + np.float32([[0], [0], [1e-6], [0]])
-    with pytest.raises(ValueError, match=rf"{name}.* can't move the goal.* HER .*leave"):
+    with pytest.raises(ValueError, match=rf"{name}.* only the goals of the step.* HER .*[Rr]emove"):
         envs.compute_reward(achieved, moved, info)
 
 
 @pytest.mark.parametrize("name", ["ActionPenalty", "SmoothnessPenalty"])
-def test_what_an_action_cost_stays_when_the_goal_moves(name):
+def test_penalties_on_actions_do_not_change_with_the_goal(name):
     envs = wrapped_vec(4, [name])
     envs.reset(seed=0)
     envs.step(np.zeros((4, 3)))
@@ -126,7 +128,7 @@ def test_stages_of_goals_alone_can_be_relabelled():
 
 def test_gymnasiums_own_vectors_of_single_environments_relabel_too():
     sync = gym.make_vec(PUSH, num_envs=3, vectorization_mode="sync")
-    envs = wrapped(sync, OF_GOALS, wrappers.vector)
+    envs = wrapped(sync, GOAL_RULES, wrappers.vector)
     envs.reset(seed=0)
     for observation, reward, *_ in steps_of(envs, random_actions(20, 3)):
         np.testing.assert_array_equal(reward, envs.compute_reward(*goals(observation), {}))
@@ -136,14 +138,14 @@ def test_gymnasiums_own_vectors_of_single_environments_relabel_too():
     "between",
     [lambda env: gym.wrappers.TransformReward(env, lambda r: 2 * r), gym.wrappers.NormalizeReward],
 )
-def test_a_reward_that_gymnasium_changed_in_between_is_refused(between):
+def test_a_reward_wrapper_of_gymnasium_in_between_raises(between):
     env = wrappers.TimePenalty(between(gym.make(PUSH)), 1.0)
     observation, _ = env.reset(seed=0)
     env.step(np.zeros(3))
-    with pytest.raises(ValueError, match=r"Reward of Gymnasium .* take a wrapper of rigid_envs"):
+    with pytest.raises(ValueError, match=r"Gymnasium's .*Reward; use a wrapper of rigid_envs"):
         env.compute_reward(*goals(observation), {})
     envs = gym.wrappers.vector.TransformReward(make_vec(2), lambda reward: 2 * reward)
     envs = wrappers.vector.TimePenalty(envs, 1.0)
     observation, _ = envs.reset(seed=0)
-    with pytest.raises(ValueError, match=r"TransformReward of Gymnasium"):
+    with pytest.raises(ValueError, match=r"Gymnasium's TransformReward"):
         envs.compute_reward(*goals(observation), {})

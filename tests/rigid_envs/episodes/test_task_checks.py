@@ -1,4 +1,4 @@
-"""Mistakes in a task of one's own are told with the method's name, at the first reset."""
+"""Mistakes in a custom task raise an error with the method's name, at the first reset."""
 
 import numpy as np
 import pytest
@@ -55,9 +55,9 @@ class OwnSuccess(Push):
 
 
 @pytest.mark.parametrize(
-    ("task", "told"),
+    ("task", "message"),
     [
-        (Forgetful, r"Forgetful\.observe must write all of out, it has left"),
+        (Forgetful, r"Forgetful\.observe must write all components of out; NaN is left in \["),
         (FlatStart, r"FlatStart\.start must return goals of shape \(1, 3\), .*got shape \(3,\)"),
         (TooFewGoals, r"TooFewGoals\.achieved must .*shape \(1, 3\).*got shape \(1, 2\)"),
         (NoGoals, r"NoGoals\.achieved must .*got None"),
@@ -68,6 +68,6 @@ class OwnSuccess(Push):
         (TallTerm, r"TallTerm\.terms must .*got shape \(1, 1\) for 'reach'"),
     ],
 )
-def test_what_a_task_gives_wrong_is_named(task, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_invalid_result_of_a_task_is_named(task, message):
+    with pytest.raises(ValueError, match=message):
         RigidEnv(task).reset(seed=0)

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.tasks.stack import ASIDE, CELL, HALF, HIGHER, JITTER, THRESHOLD, Stack, _way
+from rigid_envs.tasks.stack import (
+    CELL,
+    HALF,
+    HELD_HEIGHT,
+    HELD_OFFSET,
+    JITTER,
+    THRESHOLD,
+    Stack,
+    path_length,
+)
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import CONTROLLERS
 
@@ -25,12 +34,12 @@ def test_no_episode_starts_solved_and_cubes_have_room(blocks):
     places = np.concatenate([cubes, tower[:, :1]], axis=1)[..., :2]
     for i in range(blocks + 1):
         for j in range(i):
-            apart = np.abs(places[:, i] - places[:, j]).max(axis=1)
-            assert apart.min() >= CELL - 2.0 * JITTER - 1e-6  # wide enough for fingers between
+            distances = np.abs(places[:, i] - places[:, j]).max(axis=1)
+            assert distances.min() >= CELL - 2.0 * JITTER - 1e-6  # wide enough for fingers between
     np.testing.assert_allclose(np.abs(places).max(), CELL + JITTER, atol=1e-3)
 
 
-def test_the_goal_is_a_tower_that_nothing_holds():
+def test_the_goal_is_a_released_tower():
     observation, _ = make_vec(10, STACK, blocks=4).reset(seed=0)
     tower = cubes_of(observation["desired_goal"])
     np.testing.assert_allclose(tower[:, :, 2], np.tile(HALF * np.array([1, 3, 5, 7]), (10, 1)))
@@ -38,20 +47,26 @@ def test_the_goal_is_a_tower_that_nothing_holds():
     np.testing.assert_array_equal(observation["desired_goal"][:, -1], 1.0)
 
 
+def test_positions_in_the_goal_have_a_unit_and_released_has_none():
+    *cubes, released = Stack().goal_bounds
+    assert {unit for _, unit, _, _ in cubes} == {"m"}
+    assert released == ("released", "", 0.0, 1.0)
+
+
 @pytest.mark.parametrize("blocks", BLOCKS)
-@pytest.mark.parametrize("begun", [0.25, 1.0])
-def test_a_share_of_episodes_starts_with_a_tower_begun(blocks, begun):
+@pytest.mark.parametrize("probability", [0.25, 1.0])
+def test_a_fraction_of_episodes_starts_with_a_partial_tower(blocks, probability):
     count = 4000
-    envs = make_vec(count, STACK, blocks=blocks, begun=begun)
+    envs = make_vec(count, STACK, blocks=blocks, partial_tower_start_prob=probability)
     observation, info = envs.reset(seed=0)
     cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))
     stands = np.abs(cubes - tower).max(axis=2) < 1e-6
     np.testing.assert_array_equal(stands, np.cumprod(stands, axis=1))
     tall, spread = stands.sum(axis=1), 5.0 * np.sqrt(0.25 / count)
     assert not info["is_success"].any()
-    assert abs((tall == 0).mean() - (1.0 - begun)) < spread
+    assert abs((tall == 0).mean() - (1.0 - probability)) < spread
     for height in range(1, blocks):
-        assert abs((tall == height).mean() - begun / (blocks - 1)) < spread
+        assert abs((tall == height).mean() - probability / (blocks - 1)) < spread
 
     plain, _ = make_vec(count, STACK, blocks=blocks).reset(seed=0)
     same = tall == 0
@@ -59,8 +74,8 @@ def test_a_share_of_episodes_starts_with_a_tower_begun(blocks, begun):
         np.testing.assert_array_equal(values[same], observation[key][same])
 
 
-@pytest.mark.parametrize("name", ["begun", "at_hand"])
-def test_a_wrong_share_of_easier_starts_is_named(name):
+@pytest.mark.parametrize("name", ["partial_tower_start_prob", "near_grasp_start_prob"])
+def test_an_invalid_fraction_of_easier_starts_is_named(name):
     with pytest.raises(ValueError, match=rf"{name} must be .* at most 1, got 1\.5"):
         make(STACK, **{name: 1.5})
     with pytest.raises(TypeError, match=name):
@@ -71,10 +86,12 @@ def test_a_wrong_share_of_easier_starts_is_named(name):
     ("fidelity", "randomize"),
     [*((preset, None) for preset in PRESETS), ("balanced", {"size": (0.85, 1.25)})],
 )
-def test_a_share_of_episodes_starts_with_the_next_cube_at_hand(fidelity, randomize):
-    count, share = 400, 0.8
-    kwargs = {"begun": 0.5, "fidelity": fidelity, "randomize": randomize}
-    plain, envs = (make_vec(count, STACK, at_hand=s, **kwargs) for s in (0.0, share))
+def test_a_fraction_of_episodes_starts_near_a_grasp(fidelity, randomize):
+    count, fraction = 400, 0.8
+    kwargs = {"partial_tower_start_prob": 0.5, "fidelity": fidelity, "randomize": randomize}
+    plain, envs = (
+        make_vec(count, STACK, near_grasp_start_prob=s, **kwargs) for s in (0.0, fraction)
+    )
     before, (observation, info) = plain.reset(seed=0)[0], envs.reset(seed=0)
     assert not info["is_success"].any()
     stand, each = info["placed"].astype(int), np.arange(count)
@@ -83,51 +100,58 @@ def test_a_share_of_episodes_starts_with_the_next_cube_at_hand(fidelity, randomi
     hand, opening = observation["observation"][:, :3], observation["observation"][:, 6]
     moved = np.abs(cube - cubes_of(before["achieved_goal"])[each, stand]).max(axis=1) > 1e-6
     about = ~moved & (np.abs(hand - cube)[:, :2].max(axis=1) < 1e-6)
-    np.testing.assert_allclose([moved.mean(), about.mean()], 0.5 * share, atol=0.08)
+    np.testing.assert_allclose([moved.mean(), about.mean()], 0.5 * fraction, atol=0.08)
     rest = ~moved & ~about
     for key, values in before.items():
         np.testing.assert_array_equal(values[rest], observation[key][rest])
-    np.testing.assert_allclose(opening[about], Stack.hand.widest, atol=1e-6)
-    way = cube - place
-    assert np.abs(way[moved, :2]).max() <= ASIDE + 1e-6
-    assert way[moved, 2].min() > -1e-6
-    assert way[moved, 2].max() <= HIGHER + 0.001
+    np.testing.assert_allclose(opening[about], Stack.hand.max_opening, atol=1e-6)
+    offset = cube - place
+    assert np.abs(offset[moved, :2]).max() <= HELD_OFFSET + 1e-6
+    assert offset[moved, 2].min() > -1e-6
+    assert offset[moved, 2].max() <= HELD_HEIGHT + 0.001
 
     grip = np.tile(np.array([0.0, 0.0, 0.0, -1.0], dtype=np.float32), (count, 1))
     for _ in range(10):
         observation = envs.step(grip)[0]
     cube = cubes_of(observation["achieved_goal"])[each, stand]
     hand, near = observation["observation"][:, :3], moved | about
-    sagged = {"fast": 0.012}.get(fidelity, 0.006)  # until friction has its hold
-    assert np.abs(hand - cube)[near].max() < sagged  # nothing falls, all fingers do is close
+    sagged = {"fast": 0.012}.get(fidelity, 0.006)  # until friction holds the cube
+    assert np.abs(hand - cube)[near].max() < sagged  # nothing falls, the fingers only close
 
 
 def test_cubes_held_at_the_start_touch_nothing_else():
     sizes = {"size": (0.8, 1.2)}
-    envs = make_vec(4000, STACK, blocks=5, at_hand=1.0, begun=0.5, randomize=sizes)
+    envs = make_vec(
+        4000,
+        STACK,
+        blocks=5,
+        near_grasp_start_prob=1.0,
+        partial_tower_start_prob=0.5,
+        randomize=sizes,
+    )
     envs.reset(seed=0)
     world = envs._runner.world
-    apart = np.abs(world.position[:, :, None] - world.position[:, None])
+    distances = np.abs(world.position[:, :, None] - world.position[:, None])
     half = HALF * world.parameters.size
-    overlap = (half[:, :, None] + half[:, None] - apart.transpose(3, 0, 1, 2)).min(axis=0)
-    overlap[:, range(5), range(5)] = -1.0
-    assert overlap.max() < 1e-6
+    penetration = (half[:, :, None] + half[:, None] - distances.transpose(3, 0, 1, 2)).min(axis=0)
+    penetration[:, range(5), range(5)] = -1.0
+    assert penetration.max() < 1e-6
     pads, pad = world.drive_position, Stack.hand.PAD
-    apart = np.abs(world.position[:, :, None] - pads[:, None])
-    overlap = (half[:, :, None] + pad - apart.transpose(3, 0, 1, 2)).min(axis=0)
-    assert np.sort(overlap.max(axis=2), axis=1)[:, -2].max() < 1e-6  # but for the one held
+    distances = np.abs(world.position[:, :, None] - pads[:, None])
+    penetration = (half[:, :, None] + pad - distances.transpose(3, 0, 1, 2)).min(axis=0)
+    assert np.sort(penetration.max(axis=2), axis=1)[:, -2].max() < 1e-6  # all but the held one
 
 
-def test_a_way_leads_up_across_and_down():
-    def way(start, end):
-        return _way(np.array([start]), np.array([end]))[0]
+def test_a_path_leads_up_across_and_down():
+    def length(start, end):
+        return path_length(np.array([start]), np.array([end]))[0]
 
     end = (0.3, 0.4, 0.02)
-    assert way(end, end) == 0.0
-    assert way((0.3, 0.4, 0.2), end) == pytest.approx(0.18)  # down
-    assert way((0.0, 0.0, 0.02), end) == pytest.approx(3.0 * 0.05 + 0.5 + 0.05)
-    assert way((0.0, 0.0, 0.07), end) == pytest.approx(0.5 + 0.05)  # up already
-    assert way((0.0, 0.0, 0.2), end) == pytest.approx(0.5 + 0.18)  # higher than it need be
+    assert length(end, end) == 0.0
+    assert length((0.3, 0.4, 0.2), end) == pytest.approx(0.18)  # down
+    assert length((0.0, 0.0, 0.02), end) == pytest.approx(3.0 * 0.05 + 0.5 + 0.05)
+    assert length((0.0, 0.0, 0.07), end) == pytest.approx(0.5 + 0.05)  # up already
+    assert length((0.0, 0.0, 0.2), end) == pytest.approx(0.5 + 0.18)  # higher than it need be
 
 
 def test_a_tower_is_solved_only_when_let_go():
@@ -154,8 +178,8 @@ def test_a_tower_is_solved_only_when_let_go():
     assert gripped < reward
 
 
-def test_what_is_done_never_falls_by_much_as_a_controller_stacks():
-    """A policy that climbs the dense reward can go the whole way."""
+def test_stage_never_falls_by_much_while_a_controller_stacks():
+    """A policy that follows the dense reward can solve the task."""
     worlds = 64
     envs = make_vec(worlds, STACK, reward_type="dense")
     observation, info = envs.reset(seed=0)
@@ -170,30 +194,30 @@ def test_what_is_done_never_falls_by_much_as_a_controller_stacks():
     assert fell[solved].max() < 0.1  # a stage of a cube is 0.5
 
 
-@pytest.mark.parametrize(("cube", "share"), [(0, 1.0), (1, 0.0)])  # not the second one's turn
-def test_closing_pays_about_a_cube_until_it_is_held(cube, share):
+@pytest.mark.parametrize(("cube", "factor"), [(0, 1.0), (1, 0.0)])  # 1 is not the next cube
+def test_closing_around_the_next_cube_pays_until_it_is_held(cube, factor):
     env = make(STACK)
     observation, _ = env.reset(seed=0)
     world, hand = env._runner.world, env._runner.task.hand
     place = world.position[0, cube] + np.array([0.0, 0.0, 0.002])
-    apart = 0.5 * hand.widest + hand.PAD
-    fingers = place + np.array([[0.0, -apart, 0.0], [0.0, apart, 0.0]])
+    half = 0.5 * hand.max_opening + hand.PAD
+    fingers = place + np.array([[0.0, -half, 0.0], [0.0, half, 0.0]])
     world.set_state(drive_position=fingers[None])
     for grip, grasp in ((1.0, 0.0), (0.5, 0.25), (0.25, 0.375), (-1.0, 1.0)):
         for _ in range(10):
             strides = (place - observation["observation"][8:11]) / hand.stride
             observation, *_, info = env.step(np.clip([*strides, grip], -1.0, 1.0))
-        assert info["grasp"] == pytest.approx(share * grasp, abs=0.01)
+        assert info["grasp"] == pytest.approx(factor * grasp, abs=0.01)
 
 
-def test_a_finger_on_the_tower_undoes_nothing():
+def test_a_finger_on_top_of_a_placed_cube_leaves_it_placed():
     env = make(STACK)
     env.reset(seed=0)
     runner = env._runner
     world, hand, tower = runner.world, runner.task.hand, cubes_of(runner.goals)[0].astype(float)
-    beside = tower[1] + np.array([[0.0, s * 0.5 * HALF, -HALF + hand.PAD - 1e-3] for s in (-1, 1)])
+    pads = tower[1] + np.array([[0.0, s * 0.5 * HALF, -HALF + hand.PAD - 1e-3] for s in (-1, 1)])
     cubes = np.stack([tower[0], tower[1] + [0.0, 0.15, -2.0 * HALF]])
-    world.set_state(position=cubes[None], drive_position=beside[None])
+    world.set_state(position=cubes[None], drive_position=pads[None])
     world.advance(1e-4)
     runner._now = world.read()
     observation, info = runner.observe()
@@ -202,25 +226,25 @@ def test_a_finger_on_the_tower_undoes_nothing():
 
 
 @pytest.mark.parametrize("blocks", [2, 3])
-def test_guides_tell_of_the_next_cube(blocks):
+def test_the_task_guide_describes_the_next_cube(blocks):
     worlds = 200
-    kwargs = {"blocks": blocks, "begun": 0.5}
-    plain, envs = (make_vec(worlds, STACK, guided=g, **kwargs) for g in (False, True))
+    kwargs = {"blocks": blocks, "partial_tower_start_prob": 0.5}
+    plain, envs = (make_vec(worlds, STACK, observe_task_guide=g, **kwargs) for g in (False, True))
     before, (observation, info) = plain.reset(seed=0)[0], envs.reset(seed=0)
     cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))
     split = before["observation"].shape[1]
     np.testing.assert_array_equal(observation["observation"][:, :split], before["observation"])
-    told, each = observation["observation"][:, split:], np.arange(worlds)
+    guide, each = observation["observation"][:, split:], np.arange(worlds)
     which = info["placed"].astype(int)
     assert set(which) == set(range(blocks))
     cube, place = cubes[each, which], tower[each, which]
     hand = observation["observation"][:, :3]
-    np.testing.assert_allclose(told[:, 0:3], cube - hand, atol=1e-6)
-    np.testing.assert_allclose(told[:, 3:6], place - cube, atol=1e-6)
-    np.testing.assert_allclose(told[:, 6], which / blocks, atol=1e-6)
+    np.testing.assert_allclose(guide[:, 0:3], cube - hand, atol=1e-6)
+    np.testing.assert_allclose(guide[:, 3:6], place - cube, atol=1e-6)
+    np.testing.assert_allclose(guide[:, 6], which / blocks, atol=1e-6)
 
 
-def test_the_observation_is_what_its_bounds_name():
+def test_the_observation_matches_the_names_in_its_bounds():
     envs = make_vec(20, STACK)
     envs.reset(seed=0)
     world = envs._runner.world
@@ -253,7 +277,7 @@ def test_a_wrong_number_of_blocks_is_named(blocks, message):
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_blind_steps_stay_physical(fidelity, stress):
-    """50,000 random and bang-bang actions, and a million under stress."""
+    """50,000 random and bang-bang actions, a million with `make stress`."""
     worlds = 256
     envs = make_vec(worlds, STACK, fidelity=fidelity)
     envs.reset(seed=0)
@@ -262,7 +286,7 @@ def test_blind_steps_stay_physical(fidelity, stress):
     for observation, *_, info in steps_of(envs, actions):
         inside = ~info["out_of_bounds"]
         assert all(np.isfinite(values).all() for values in observation.values())
-        # a hand of 14 N presses a cube in, and pads at 1.6 m/s push it out: no more than that
+        # a hand presses a cube in with 14 N, and pads at 1.6 m/s push it out
         assert world.kinetic_energy()[inside].max() < 2.0
         assert world.position[inside][..., 2].min() > 0.0
         assert world.drive_position[inside][..., 2].min() > 0.0
@@ -280,26 +304,26 @@ def test_a_random_policy_hardly_ever_solves_it(fidelity):
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_scripted_controller_builds_a_tower_of_two(fidelity, stress):
-    """1,000 seeds at balanced, and under stress at all presets."""
+    """1,000 seeds at balanced, with `make stress` at all presets."""
     worlds = 1000 if stress or fidelity == "balanced" else 200
     assert solved(fidelity, worlds, 2).mean() >= 0.98
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_scripted_controller_builds_a_tower_of_three(fidelity, stress):
-    """200 seeds, but at accurate, and under stress 1,000 at all presets."""
+    """200 seeds except at accurate; with `make stress`, 1,000 at all presets."""
     if fidelity == "accurate" and not stress:
         pytest.skip("see make stress")
     assert solved(fidelity, 1000 if stress else 200, 3).mean() >= 0.9
 
 
 def solved(fidelity: str, worlds: int, blocks: int) -> np.ndarray:
-    """Which [worlds] the controller leaves solved."""
+    """Whether [worlds] the controller solves the task."""
     envs = make_vec(worlds, STACK, fidelity=fidelity, blocks=blocks)
     observation, _ = envs.reset(seed=0)
     for _ in range(EPISODE):
         observation, _, _, truncated, info = envs.step(CONTROLLERS[STACK](observation))
     assert truncated.all()
-    apart = distance(observation["achieved_goal"], observation["desired_goal"])
-    np.testing.assert_array_equal(info["is_success"], apart <= THRESHOLD)
+    goal_distance = distance(observation["achieved_goal"], observation["desired_goal"])
+    np.testing.assert_array_equal(info["is_success"], goal_distance <= THRESHOLD)
     return info["is_success"]

@@ -1,4 +1,4 @@
-"""Randomised episodes: what is drawn, that seeds reproduce it, and what is refused."""
+"""Randomised episodes: what is drawn, that seeds reproduce it, and which ranges raise."""
 
 import copy
 import pickle
@@ -35,13 +35,13 @@ def vector(count, **arguments):
 
 
 def played(env, steps, options=None):
-    """Observations of a rollout of a vector environment, two episodes long."""
+    """Observations of a rollout of a vector environment."""
     seen = [env.reset(seed=5, options=options)[0]["observation"]]
     seen += [env.step(a)[0]["observation"] for a in actions(steps, env.num_envs)]
     return np.stack(seen)
 
 
-def test_every_episode_draws_parameters_of_its_own_within_the_ranges():
+def test_every_episode_draws_its_own_parameters_within_the_ranges():
     runner = Runner("push", 500, randomize=RANGES)
     runner.reset(np.ones(500, dtype=bool), np.arange(500))
     first = runner.world.parameters
@@ -56,7 +56,7 @@ def test_every_episode_draws_parameters_of_its_own_within_the_ranges():
     np.testing.assert_array_equal(runner.world.parameters.mass[250:], first.mass[250:])
 
 
-def test_a_world_of_many_is_the_single_environment_bit_for_bit():
+def test_a_world_of_many_is_bitwise_identical_to_the_single_environment():
     count, steps = 9, 60
     many = played(vector(count, observe_parameters=True, max_episode_steps=25), steps)
     for i in (0, 5, 8):
@@ -85,7 +85,7 @@ def test_a_cube_of_another_size_lies_on_the_ground():
     np.testing.assert_allclose(runner.world.position[:, 0, 2], half, atol=5e-4)
 
 
-def test_cubes_of_other_sizes_lie_on_the_ground_and_stand_as_the_tower_that_is_asked_for():
+def test_cubes_of_other_sizes_lie_on_the_ground_and_fit_their_tower():
     runner = Runner("stack", 100, randomize={"size": (0.75, 1.4)}, blocks=3)
     runner.reset(np.ones(100, dtype=bool), np.arange(100))
     world, half = runner.world, 0.02 * runner.world.parameters.size
@@ -106,7 +106,7 @@ def test_cubes_of_other_sizes_lie_on_the_ground_and_stand_as_the_tower_that_is_a
 
 
 def test_no_stack_of_other_sizes_starts_solved_and_open_fingers_have_room():
-    """At the ends of what the task takes: a threshold high, and fingers fit between."""
+    """At both ends of the size range: the first cube is a threshold high, and fingers fit."""
     for size in (0.5, 1.5):
         runner = Runner("stack", 500, randomize={"size": size}, blocks=5)
         runner.reset(np.ones(500, dtype=bool), np.arange(500))
@@ -114,7 +114,7 @@ def test_no_stack_of_other_sizes_starts_solved_and_open_fingers_have_room():
     places = np.concatenate(
         [runner.world.position, runner.goals[:, None, :3].astype(float)], axis=1
     )[..., :2]
-    hand = 0.5 * runner.task.hand.widest + 2.0 * runner.task.hand.PAD
+    hand = 0.5 * runner.task.hand.max_opening + 2.0 * runner.task.hand.PAD
     for i in range(6):
         for j in range(i):
             apart = np.abs(places[:, i] - places[:, j]).max(axis=1)
@@ -155,7 +155,7 @@ def test_where_a_ball_of_another_size_would_land_is_known():
 
 @pytest.mark.parametrize("env_id", [STACK, THROW])
 def test_a_start_of_another_size_does_not_depend_on_other_worlds(env_id):
-    """Nor do the steps after it; Push has the longer test above."""
+    """Nor do the steps after it. The test above does the same for Push, with more steps."""
     ranges = {**RANGES, "size": (0.75, 1.4)}
     many = gym.make_vec(env_id, num_envs=9, randomize=ranges)
     seen = [many.reset(seed=5)[0]]
@@ -170,7 +170,7 @@ def test_a_start_of_another_size_does_not_depend_on_other_worlds(env_id):
 
 
 @pytest.mark.parametrize("env_id", [STACK, THROW])
-def test_sizes_of_one_change_no_bit(env_id):
+def test_size_factors_of_one_change_no_bit(env_id):
     found = []
     for randomize in (None, {"size": 1.0}):
         env = gym.make_vec(env_id, num_envs=4, reward_type="dense", randomize=randomize)
@@ -183,7 +183,7 @@ def test_sizes_of_one_change_no_bit(env_id):
 
 @pytest.mark.parametrize(("env_id", "steps", "least"), [(STACK, 100, 0.98), (THROW, 50, 0.98)])
 def test_a_scripted_controller_copes_with_other_sizes(env_id, steps, least):
-    """It knows them from the goal's heights alone; 200 seeds."""
+    """It computes the sizes from the heights in the goal. 200 seeds."""
     env = gym.make_vec(env_id, num_envs=200, randomize={"size": (0.8, 1.2)})
     observation, _ = env.reset(seed=0)
     for _ in range(steps):
@@ -200,7 +200,7 @@ def test_a_picture_shows_the_size_that_was_drawn():
     runner = Runner("stack", 2, randomize={"size": (0.8, 1.2)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
     cubes = scene_view.items(runner, 1)[:2]
-    ghosts = runner.task.signs(runner.world, 1, runner.goals[1])
+    ghosts = runner.task.markers(runner.world, 1, runner.goals[1])
     for cube, ghost in zip(cubes, ghosts, strict=True):
         np.testing.assert_allclose(ghost.half_extents, cube.shape.half_extents)
 
@@ -224,8 +224,8 @@ def test_without_randomisation_nothing_is_added_and_no_bit_changes():
     assert played(plain, 20).tobytes() == played(none, 20).tobytes()
     assert not none.unwrapped._runner.world.features.varied
     assert not vector(2, randomize={"noise": 0.1}).unwrapped._runner.world.features.varied
-    alike = {"mass": (1.0, 1.0), "friction": 0.5, "restitution": 0.1, "size": 1.0}
-    assert played(vector(4, randomize=alike), 20).tobytes() == played(plain, 20).tobytes()
+    same = {"mass": (1.0, 1.0), "friction": 0.5, "restitution": 0.1, "size": 1.0}
+    assert played(vector(4, randomize=same), 20).tobytes() == played(plain, 20).tobytes()
 
 
 # --- noise --------------------------------------------------------------------------------------
@@ -253,7 +253,7 @@ def test_streams_leave_the_draws_of_starts_as_they_are():
         assert mixed[i].tobytes() == alone[0].tobytes()
 
 
-def test_noise_moves_what_is_told_to_rest_and_actions_stay_within_their_limits():
+def test_noise_moves_a_resting_finger_and_actions_stay_within_their_limits():
     still, shaken = vector(3, randomize={"noise": 0.0}), vector(3, randomize={"noise": 0.5})
     for env, moves in ((still, False), (shaken, True)):
         before = env.reset(seed=0)[0]["observation"][:, :3]
@@ -262,14 +262,14 @@ def test_noise_moves_what_is_told_to_rest_and_actions_stay_within_their_limits()
     runner = Runner("push", 3, randomize={"noise": 5.0})
     runner.reset(np.ones(3, dtype=bool), np.arange(3))
     steps, seeds = np.zeros(3, dtype=int), np.arange(3)
-    disturbed = runner.randomization.disturb(np.ones((3, 3)), seeds, steps, steps)
+    disturbed = runner.randomization.add_noise(np.ones((3, 3)), seeds, steps, steps)
     assert np.abs(disturbed).max() <= 1.0
 
 
 # --- options, states ----------------------------------------------------------------------------
 
 
-def test_options_give_the_worlds_that_they_reset_other_ranges_until_taken_back():
+def test_options_set_the_ranges_of_the_reset_worlds_until_restored():
     env = gym.make_vec(PUSH, num_envs=4, autoreset_mode="Disabled")
     runner = env.unwrapped._runner
     env.reset(seed=0)
@@ -299,7 +299,7 @@ def test_worlds_that_are_not_reset_carry_on_to_the_last_bit_under_options():
 
 
 @pytest.mark.parametrize("way", ["state", "pickle", "deepcopy"])
-def test_what_is_carried_over_continues_to_the_last_bit(way):
+def test_states_and_copies_continue_bitwise_identically(way):
     env = vector(3, observe_parameters=True)
     played(env, 10)
     if way == "state":
@@ -312,13 +312,13 @@ def test_what_is_carried_over_continues_to_the_last_bit(way):
         assert a.tobytes() == b.tobytes()
 
 
-def test_gymnasiums_checker_has_nothing_to_say(recwarn):
+def test_gymnasiums_checker_accepts_randomization(recwarn):
     env = gym.make(PUSH, randomize=RANGES, observe_parameters=True)
     check_env(env.unwrapped, skip_render_check=True)
     assert not [w for w in recwarn if issubclass(w.category, UserWarning)]
 
 
-# --- what is refused ----------------------------------------------------------------------------
+# --- errors ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -349,11 +349,11 @@ def test_bad_ranges_are_named_at_construction_and_at_reset(ranges, error, messag
         np.testing.assert_array_equal(before[name], after[name])
 
 
-def test_a_task_laid_out_for_one_size_takes_no_other():
+def test_a_task_for_one_size_accepts_no_other():
     class OneSize(Push):
-        sizes = None
+        size_range = None
 
-    with pytest.raises(ValueError, match=r"randomize\['size'\]: this task is laid out for bodies"):
+    with pytest.raises(ValueError, match=r"randomize\['size'\]: this task supports only the sizes"):
         Runner(OneSize, 1, randomize={"size": (0.9, 1.1)})
 
 
@@ -367,7 +367,7 @@ def test_a_task_laid_out_for_one_size_takes_no_other():
         ("throw", (1.0, 2.0), "within 0.5 and 1.75 in this task, got (1.0, 2.0)"),
     ],
 )
-def test_sizes_that_a_task_has_no_room_for_are_refused(task, size, wanted):
+def test_unsupported_sizes_raise(task, size, wanted):
     name, options = task if isinstance(task, tuple) else (task, {})
     with pytest.raises(ValueError, match=re.escape(f"randomize['size'] must be {wanted}")):
         Runner(name, 1, randomize={"size": size}, **options)

@@ -180,7 +180,7 @@ def test_one_world_and_many_draw_alike(env_id, option):
 @pytest.mark.parametrize("task", [Push(), Stack(5), Throw()], ids=lambda t: type(t).__name__)
 def test_the_camera_sees_the_whole_task(task):
     world = World(task.scene())
-    draws = np.random.default_rng(0).random((1, 200, task.draws))[0]
+    draws = np.random.default_rng(0).random((1, 200, task.draw_count))[0]
     points = []
     for row in draws:
         goal = task.start(world, np.ones(1, dtype=bool), row[None])[0]
@@ -214,7 +214,7 @@ def test_the_camera_sees_the_tool_wherever_it_goes(task, low, high):
 def test_a_tower_has_a_ghost_for_each_cube_in_its_colour(blocks):
     env = make("RigidEnvs/Stack-v0", blocks=blocks)
     env.reset(seed=0)
-    ghosts = scene_view.signs(env._runner, 0)
+    ghosts = scene_view.markers(env._runner, 0)
     assert [ghost.color for ghost in ghosts] == list(BODY_COLORS[:blocks])
     heights = [ghost.position[2] for ghost in ghosts]
     np.testing.assert_allclose(heights, 0.02 + 0.04 * np.arange(blocks), atol=1e-6)
@@ -223,11 +223,11 @@ def test_a_tower_has_a_ghost_for_each_cube_in_its_colour(blocks):
 def test_a_cross_shows_where_the_ball_landed_and_stays_there():
     env = make("RigidEnvs/Throw-v0")
     env.reset(seed=0)
-    assert not any(isinstance(sign, Mark) for sign in scene_view.signs(env._runner, 0))
+    assert not any(isinstance(marker, Mark) for marker in scene_view.markers(env._runner, 0))
     for _ in range(12):  # down and away
         observation, *_ = env.step(np.array([1.0, 0.0, 0.0, 1.0]))
     for _ in range(3):
-        (mark,) = [s for s in scene_view.signs(env._runner, 0) if isinstance(s, Mark)]
+        (mark,) = [m for m in scene_view.markers(env._runner, 0) if isinstance(m, Mark)]
         np.testing.assert_allclose(mark.position, observation["achieved_goal"], atol=1e-6)
         env.step(np.array([1.0, 0.0, 0.0, 1.0]))
 

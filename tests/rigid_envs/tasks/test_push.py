@@ -8,14 +8,14 @@ import pytest
 
 from rigid_envs.episodes.draws import uniform
 from rigid_envs.tasks.push import (
-    ARM,
-    CLEAR,
+    GOAL_DRAWS,
     HALF,
+    HEADING_LENGTH,
+    POST_CLEARANCE,
     POST_RADIUS,
     POSTS,
     RANGE,
     THRESHOLD,
-    TRIES,
     Push,
     heading,
 )
@@ -59,12 +59,12 @@ def test_starts_and_goals_fill_the_square():
         np.testing.assert_allclose(place[:, 2], HALF, atol=1e-6)
 
 
-def test_a_goal_lies_apart_even_where_all_that_were_drawn_were_near():
+def test_a_goal_is_away_from_the_cube_even_if_all_drawn_goals_are_near():
     envs = make_vec(4)
     envs.reset(seed=0)
     corners = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]])
-    draws = np.concatenate([corners, np.zeros((4, 1)), np.tile(corners, (1, TRIES))], axis=1)
-    assert draws.shape[1] == Push.draws
+    draws = np.concatenate([corners, np.zeros((4, 1)), np.tile(corners, (1, GOAL_DRAWS))], axis=1)
+    assert draws.shape[1] == Push.draw_count
     goals = Push().start(envs._runner.world, np.ones(4, dtype=bool), draws)
     cubes = envs._runner.world.position[:, 0]
     assert distance(goals, cubes).min() > THRESHOLD
@@ -73,12 +73,12 @@ def test_a_goal_lies_apart_even_where_all_that_were_drawn_were_near():
 
 def test_the_draws_of_an_episode_are_its_start():
     observation, _ = make_vec(10).reset(seed=40)
-    draws = uniform(np.arange(40, 50), np.zeros(10, dtype=int), Push.draws)
+    draws = uniform(np.arange(40, 50), np.zeros(10, dtype=int), Push.draw_count)
     expected = RANGE * (2.0 * draws[:, :2] - 1.0)
     np.testing.assert_allclose(observation["achieved_goal"][:, :2], expected, rtol=1e-6)
 
 
-def test_the_observation_is_what_its_bounds_name():
+def test_the_observation_matches_the_names_in_its_bounds():
     envs = make_vec(30)
     envs.reset(seed=0)
     world = envs._runner.world
@@ -115,7 +115,7 @@ def lowest_point(observation):
 
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_blind_steps_stay_physical(fidelity, stress):
-    """200,000 random and bang-bang actions, and a million under stress."""
+    """200,000 random and bang-bang actions, a million with `make stress`."""
     envs = make_vec(1024, fidelity=fidelity)
     envs.reset(seed=0)
     world = envs._runner.world
@@ -176,12 +176,12 @@ def clear_of_posts(places: np.ndarray, obstacles: int) -> np.ndarray:
     return np.linalg.norm(places[:, None, :2] - POSTS[:obstacles], axis=2).min(axis=1, initial=1.0)
 
 
-def test_without_options_push_is_what_it_was():
-    plain, told = Push(), Push(target_yaw=False, obstacles=0)
-    assert plain.draws == told.draws == 3 + 2 * TRIES
-    assert plain.goal_bounds == told.goal_bounds == Push.goal_bounds
+def test_default_options_change_nothing():
+    plain, explicit = Push(), Push(target_yaw=False, obstacles=0)
+    assert plain.draw_count == explicit.draw_count == 3 + 2 * GOAL_DRAWS
+    assert plain.goal_bounds == explicit.goal_bounds == Push.goal_bounds
     assert len(plain.goal_bounds) == 3
-    scene = told.scene()
+    scene = explicit.scene()
     assert (len(scene.bodies), len(scene.statics), len(scene.drives)) == (1, 1, 1)
     envs = make_vec(20), make_vec(20, target_yaw=False, obstacles=0)
     assert_same(envs[0].reset(seed=0), envs[1].reset(seed=0))
@@ -194,7 +194,7 @@ def test_options_change_neither_the_numbers_drawn_before_nor_the_observation(opt
     plain, other = make_vec(200).reset(seed=0)[0], make_vec(200, **options).reset(seed=0)[0]
     assert plain["observation"].shape == other["observation"].shape
     before, after = plain["achieved_goal"], other["achieved_goal"][:, :3]
-    clear = clear_of_posts(before, options.get("obstacles", 0)) > CLEAR
+    clear = clear_of_posts(before, options.get("obstacles", 0)) > POST_CLEARANCE
     np.testing.assert_array_equal(before[clear], after[clear])
     assert clear.mean() > 0.5
 
@@ -208,41 +208,41 @@ def test_with_options_no_episode_starts_solved_or_near_a_post(options):
         assert np.abs(place[:, :2]).max() <= RANGE
         assert np.abs(place[:, :2]).max() > 0.99 * RANGE
         if "obstacles" in options:
-            assert clear_of_posts(place, options["obstacles"]).min() >= CLEAR - 1e-6
+            assert clear_of_posts(place, options["obstacles"]).min() >= POST_CLEARANCE - 1e-6
     apart = observation["achieved_goal"] - observation["desired_goal"]
     assert np.linalg.norm(apart[:, :3], axis=1).min() > THRESHOLD
 
 
 def test_a_cube_clear_of_a_post_does_not_touch_it_at_any_yaw():
-    assert np.sqrt(2.0) * HALF + POST_RADIUS < CLEAR
+    assert np.sqrt(2.0) * HALF + POST_RADIUS < POST_CLEARANCE
 
 
 @pytest.mark.parametrize("obstacles", [1, 2, 3, 4])
-def test_starts_and_goals_are_clear_even_where_all_that_were_drawn_were_not(obstacles):
+def test_starts_and_goals_are_clear_of_posts_even_if_no_drawn_place_is(obstacles):
     envs = make_vec(obstacles, obstacles=obstacles)
     envs.reset(seed=0)
     task = envs._runner.task
     on_post = 0.5 * POSTS[:obstacles] / RANGE + 0.5
-    draws = np.zeros((obstacles, task.draws))
-    draws[:, :2], draws[:, 3:] = on_post, np.tile(on_post, (1, 2 * TRIES))
+    draws = np.zeros((obstacles, task.draw_count))
+    draws[:, :2], draws[:, 3:] = on_post, np.tile(on_post, (1, 2 * GOAL_DRAWS))
     goals = task.start(envs._runner.world, np.ones(obstacles, dtype=bool), draws)
     cubes = envs._runner.world.position[:, 0]
     for place in (goals, cubes):
-        assert clear_of_posts(place, obstacles).min() > CLEAR
+        assert clear_of_posts(place, obstacles).min() > POST_CLEARANCE
     assert distance(goals, cubes).min() > THRESHOLD
 
 
-def test_yaws_that_are_asked_for_fill_a_quarter_turn():
+def test_goal_yaws_fill_a_quarter_turn():
     goal = make_vec(5000, target_yaw=True).reset(seed=0)[0]["desired_goal"]
-    np.testing.assert_allclose(np.linalg.norm(goal[:, 3:], axis=1), ARM, rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(goal[:, 3:], axis=1), HEADING_LENGTH, rtol=1e-6)
     yaw = np.mod(np.degrees(0.25 * np.arctan2(goal[:, 4], goal[:, 3])), 90.0)
-    share = np.histogram(yaw, bins=6, range=(0.0, 90.0))[0] / 5000
-    np.testing.assert_allclose(share, 1.0 / 6.0, atol=0.03)
+    fraction = np.histogram(yaw, bins=6, range=(0.0, 90.0))[0] / 5000
+    np.testing.assert_allclose(fraction, 1.0 / 6.0, atol=0.03)
 
 
 def test_a_cube_that_lies_on_any_face_has_the_heading_of_its_yaw():
     yaw = np.radians(np.linspace(-180.0, 180.0, 49))
-    expected = ARM * np.stack([np.cos(4.0 * yaw), np.sin(4.0 * yaw)], axis=1)
+    expected = HEADING_LENGTH * np.stack([np.cos(4.0 * yaw), np.sin(4.0 * yaw)], axis=1)
     quarters = 0.5 * np.pi * np.arange(4)
     for a, b, c in itertools.product(quarters, repeat=3):  # these take a cube onto itself
         onto_itself = after(spun(a, 2), after(spun(b, 1), spun(c, 0)))
@@ -253,13 +253,13 @@ def test_a_cube_that_lies_on_any_face_has_the_heading_of_its_yaw():
 def test_a_tilted_cube_has_a_shorter_heading_and_none_on_a_corner():
     tilt = np.radians(np.linspace(0.0, 45.0, 10))
     length = np.linalg.norm(heading(spun(tilt, 0)), axis=1)
-    assert length[0] == pytest.approx(ARM)
+    assert length[0] == pytest.approx(HEADING_LENGTH)
     assert (np.diff(length) < 0.0).all()
     on_corner = after(spun(np.array([np.arctan(np.sqrt(0.5))]), 1), spun(np.array([np.pi / 4]), 0))
     np.testing.assert_allclose(heading(on_corner), 0.0, atol=1e-9)
     turns = np.random.default_rng(0).normal(size=(1000, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    assert np.linalg.norm(heading(turns), axis=1).max() <= ARM * (1.0 + 1e-9)
+    assert np.linalg.norm(heading(turns), axis=1).max() <= HEADING_LENGTH * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("degrees", [-44, -16, -14, 0, 14, 16, 44, 76, 104, 180, 270])
@@ -273,11 +273,11 @@ def test_a_yaw_within_fifteen_degrees_counts_and_so_does_a_quarter_turn_more(deg
     assert info["is_success"] == (abs((degrees + 45) % 90 - 45) <= 15)
 
 
-def test_dots_mark_the_corners_of_a_cube_at_the_yaw_asked_for():
+def test_dots_mark_the_corners_of_a_cube_at_the_goal_yaw():
     env = make(target_yaw=True)
     env.reset(seed=4)
     goal = env._runner.goals[0].astype(float)
-    _, *dots = env._runner.task.signs(env._runner.world, 0, goal)
+    _, *dots = env._runner.task.markers(env._runner.world, 0, goal)
     yaw = 0.25 * np.arctan2(goal[4], goal[3])
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     corners = goal[:2] + CORNERS[::2, :2] @ turn.T
@@ -287,7 +287,7 @@ def test_dots_mark_the_corners_of_a_cube_at_the_yaw_asked_for():
     np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-9)
 
 
-def test_reach_is_of_the_place_behind_the_cube_whatever_yaw_is_asked_for():
+def test_reach_does_not_depend_on_the_goal_yaw():
     plain, other = make_vec(50), make_vec(50, target_yaw=True)
     for envs in (plain, other):
         envs.reset(seed=0)
@@ -299,9 +299,9 @@ def test_reach_is_of_the_place_behind_the_cube_whatever_yaw_is_asked_for():
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity, stress):
     if fidelity == "solid" and not stress:
-        pytest.skip("a kernel of its own for half a minute; test_push_block has posts at solid")
+        pytest.skip("would compile another kernel for 30 s; test_push_block has posts at solid")
     pressed_in = {"fast": 0.006}.get(fidelity, 0.004)
-    envs = make_vec(4, obstacles=4, fidelity=fidelity, max_episode_steps=None)
+    envs = make_vec(4, obstacles=4, fidelity=fidelity, max_episode_steps=-1)
     envs.reset(seed=0)
     away = POSTS / np.linalg.norm(POSTS, axis=1, keepdims=True)
     position, finger = np.full((4, 1, 3), HALF), np.full((4, 1, 3), HALF)
@@ -318,7 +318,7 @@ def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity, stress):
 @pytest.mark.parametrize("fidelity", PRESETS)
 def test_blind_steps_among_posts_stay_physical(fidelity, stress):
     if fidelity == "solid" and not stress:
-        pytest.skip("a kernel of its own for half a minute; test_push_block has posts at solid")
+        pytest.skip("would compile another kernel for 30 s; test_push_block has posts at solid")
     envs = make_vec(256, fidelity=fidelity, obstacles=4, target_yaw=True)
     envs.reset(seed=0)
     world = envs._runner.world
@@ -369,6 +369,6 @@ def test_the_scripted_controller_solves_every_option(options, least):
         ({"obstacle": 2}, TypeError, "did you mean 'obstacles'"),
     ],
 )
-def test_a_bad_option_is_named_with_what_would_be_right(option, error, match):
+def test_an_invalid_option_raises_an_error_that_names_it(option, error, match):
     with pytest.raises(error, match=match):
         make(**option)

@@ -27,26 +27,26 @@ def goals(*shape: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def info_of(achieved, desired, reach):
-    """What a step's info would hold that ends with these goals."""
-    return {"reach": reach, "goals_of_terms": np.concatenate([achieved, desired], axis=-1)}
+    """The info of a step that ends with these goals."""
+    return {"reach": reach, "step_goals": np.concatenate([achieved, desired], axis=-1)}
 
 
-@pytest.mark.parametrize(("apart", "reward"), [(0.0, 0.0), (0.0499, 0.0), (0.0501, -1.0)])
-def test_sparse_reward_is_zero_within_the_threshold_and_minus_one_beyond(apart, reward):
-    goal = np.array([0.0, apart, 0.0], dtype=np.float32)
+@pytest.mark.parametrize(("goal_distance", "reward"), [(0.0, 0.0), (0.0499, 0.0), (0.0501, -1.0)])
+def test_sparse_reward_is_zero_within_the_threshold_and_minus_one_beyond(goal_distance, reward):
+    goal = np.array([0.0, goal_distance, 0.0], dtype=np.float32)
     assert REWARD.compute("sparse", ORIGIN, goal, {}) == reward
 
 
 def test_dense_reward_is_the_sum_of_weighted_terms():
     near = np.array([0.03, 0.0, 0.04], dtype=np.float32)
     far = np.array([0.3, 0.0, 0.4], dtype=np.float32)
-    told = info_of(far, ORIGIN, -2.0)
-    assert REWARD.compute("dense", far, ORIGIN, told) == pytest.approx(-5.0 - 0.6)
+    info = info_of(far, ORIGIN, -2.0)
+    assert REWARD.compute("dense", far, ORIGIN, info) == pytest.approx(-5.0 - 0.6)
     near *= 0.9
     assert REWARD.compute("dense", near, ORIGIN, info_of(near, ORIGIN, 1.0)) == pytest.approx(0.85)
 
 
-def test_goals_are_as_far_apart_as_their_farthest_points():
+def test_goal_distance_is_the_largest_distance_of_their_points():
     one, other = np.zeros((1, 7)), np.array([[0.03, 0.0, 0.04, 0.0, 0.06, 0.08, 0.02]])
     assert distance(one, other)[0] == pytest.approx(0.1)
     other[0, 6] = -1.0  # what is left over is a point of one component
@@ -79,7 +79,7 @@ def test_the_reward_of_one_pair_of_goals_is_a_python_float():
 
 
 @pytest.mark.parametrize("info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reach": np.nan}])
-def test_sparse_reward_does_not_look_at_the_info(info):
+def test_sparse_reward_ignores_the_info(info):
     achieved, desired = goals(7)
     np.testing.assert_array_equal(
         REWARD.compute("sparse", achieved, desired, info),
@@ -99,8 +99,8 @@ def test_dense_reward_takes_a_dict_of_arrays_or_a_dict_for_each():
 @pytest.mark.parametrize(
     "info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reech": 0.0}, {"reach": np.zeros(7)}]
 )
-def test_dense_reward_without_its_terms_names_them_and_the_way_out(info):
-    with pytest.raises(ValueError, match=r"\['reach'\].*HER.*reward_type=\"sparse\""):
+def test_dense_reward_without_its_terms_names_them_and_suggests_the_sparse_reward(info):
+    with pytest.raises(ValueError, match=r"\['reach', 'step_goals'\].*HER.*reward_type=\"sparse\""):
         REWARD.compute("dense", *goals(7), info)
 
 
@@ -115,46 +115,46 @@ def other_goals(achieved, desired):
 
 
 @pytest.mark.parametrize("env_id", IDS)
-def test_dense_reward_of_other_goals_than_the_steps_is_refused(env_id):
-    """Even if they are as far apart, as exchanged ones are: the terms hold for the step's own."""
+def test_dense_reward_of_other_goals_than_the_steps_raises(env_id):
+    """Even at the same distance, as after a swap: the terms are those of the step's goals."""
     env = make(env_id, reward_type="dense")
     env.reset(seed=3)
     observation, reward, _, _, info = env.step(env.action_space.sample())
     step = observation["achieved_goal"], observation["desired_goal"]
     for pair in other_goals(*step):
-        with pytest.raises(ValueError, match=r"other goals than the step's.*HER.*sparse"):
+        with pytest.raises(ValueError, match=r"other goals than those of the step.*HER.*sparse"):
             env.compute_reward(*pair, info)
     assert env.compute_reward(*step, info) == reward
 
 
 @pytest.mark.parametrize("env_id", IDS)
-def test_dense_reward_of_other_goals_is_refused_for_vectors(env_id):
+def test_dense_reward_of_other_goals_raises_for_vectors(env_id):
     envs = make_vec(4, env_id, reward_type="dense")
     envs.reset(seed=3)
     observation, reward, _, _, info = envs.step(envs.action_space.sample())
     step = observation["achieved_goal"], observation["desired_goal"]
     infos = [{key: info[key][i] for key in info} for i in range(4)]
-    for told in (info, infos):
+    for given in (info, infos):
         for pair in other_goals(*step):
-            with pytest.raises(ValueError, match="other goals than the step's"):
-                envs.compute_reward(*pair, told)
+            with pytest.raises(ValueError, match="other goals than those of the step"):
+                envs.compute_reward(*pair, given)
         swapped = [goals[[1, 0, 2, 3]] for goals in step]
-        with pytest.raises(ValueError, match="other goals than the step's"):
-            envs.compute_reward(*swapped, told)
-        np.testing.assert_array_equal(envs.compute_reward(*step, told), reward)
+        with pytest.raises(ValueError, match="other goals than those of the step"):
+            envs.compute_reward(*swapped, given)
+        np.testing.assert_array_equal(envs.compute_reward(*step, given), reward)
 
 
-def test_dense_reward_that_goals_tell_can_be_relabelled():
+def test_dense_reward_that_follows_from_the_goals_can_be_relabelled():
     reward = Reward(threshold=0.05, weights={"success": 1.0, "distance": 2.0, "time": -1.0})
     achieved, desired = goals(7)
     assert reward.compute("dense", achieved, achieved, {}).tolist() == [0.0] * 7
-    apart = distance(achieved, desired)
-    expected = (apart <= 0.05) - 2.0 * apart - 1.0
+    goal_distance = distance(achieved, desired)
+    expected = (goal_distance <= 0.05) - 2.0 * goal_distance - 1.0
     np.testing.assert_allclose(reward.compute("dense", achieved, desired, None), expected)
 
 
-@pytest.mark.parametrize(("env_id", "hurry"), [(PUSH, 0.0), (STACK, 2.0), (THROW, 1.0)])
-def test_steps_cost_where_success_ends_the_episode(env_id, hurry):
+@pytest.mark.parametrize(("env_id", "penalty"), [(PUSH, 0.0), (STACK, 2.0), (THROW, 1.0)])
+def test_the_time_penalty_applies_if_success_terminates_the_episode(env_id, penalty):
     paid = []
     for ends in (False, True):
         envs = make_vec(4, env_id, reward_type="dense", terminate_on_success=ends)
@@ -163,12 +163,12 @@ def test_steps_cost_where_success_ends_the_episode(env_id, hurry):
         observation, reward, _, _, info = envs.step(actions)
         goals_of_step = observation["achieved_goal"], observation["desired_goal"]
         np.testing.assert_array_equal(envs.compute_reward(*goals_of_step, info), reward)
-        assert envs.reward.weights.get("time", 0.0) == (-hurry if ends else 0.0)
+        assert envs.reward.weights.get("time", 0.0) == (-penalty if ends else 0.0)
         paid.append(reward)
-    np.testing.assert_allclose(paid[0] - paid[1], hurry, rtol=1e-6)
+    np.testing.assert_allclose(paid[0] - paid[1], penalty, rtol=1e-6)
 
 
-def test_the_last_info_of_an_ended_episode_tells_its_goals():
+def test_the_last_info_of_an_episode_contains_its_goals():
     envs = make_vec(3, reward_type="dense", max_episode_steps=2, autoreset_mode="SameStep")
     envs.reset(seed=0)
     for _ in range(2):
@@ -188,22 +188,22 @@ def test_goals_of_different_shape_are_refused(kind):
 
 
 @pytest.mark.parametrize("kind", REWARDS)
-def test_a_step_pays_what_compute_reward_says_of_what_it_returns(kind):
+def test_a_step_returns_the_reward_of_compute_reward(kind):
     env = make(reward_type=kind)
     env.reset(seed=3)
     for observation, reward, _, _, info in steps_of(env, random_actions(50, 1)[:, 0]):
-        told = {} if kind == "sparse" else info
+        given = {} if kind == "sparse" else info
         achieved, desired = observation["achieved_goal"], observation["desired_goal"]
         assert type(reward) is float
-        assert reward == env.compute_reward(achieved, desired, told)
+        assert reward == env.compute_reward(achieved, desired, given)
 
 
 @pytest.mark.parametrize("kind", REWARDS)
-def test_a_step_of_many_worlds_pays_what_compute_reward_says(kind):
+def test_a_step_of_many_worlds_returns_the_rewards_of_compute_reward(kind):
     envs = make_vec(64, reward_type=kind)
     envs.reset(seed=3)
     for observation, reward, _, _, info in steps_of(envs, random_actions(50, 64)):
-        told = {} if kind == "sparse" else info
+        given = {} if kind == "sparse" else info
         achieved, desired = observation["achieved_goal"], observation["desired_goal"]
-        np.testing.assert_array_equal(reward, envs.compute_reward(achieved, desired, told))
+        np.testing.assert_array_equal(reward, envs.compute_reward(achieved, desired, given))
         np.testing.assert_array_equal(info["is_success"], distance(achieved, desired) <= 0.05)
