@@ -1,13 +1,13 @@
-"""The command line: starts without the training extra, helps, and never shows a traceback."""
+"""The command line: it starts without the train extra, and mistakes give one line."""
 
 import subprocess
 import sys
 
 import pytest
 
-from training.commands import cli
+from training.commands import cli, extras, handlers
 
-COMMANDS = ("train", "evaluate", "record", "scripted", "plot", "tune", "demo")
+COMMANDS = ("train", "evaluate", "record", "export", "scripted", "plot", "tune", "demo")
 
 
 def test_starts_without_stable_baselines3_and_torch():
@@ -46,28 +46,30 @@ def test_every_command_has_help(command, capsys):
         (["train", "-n", "0"], "should be an integer of at least 1"),
         (["train", "-n", "many"], "should be an integer of at least"),
         (["train", "-n", "-5"], "should be an integer of at least 1"),
-        (["train", "--algo", "sac", "--env", "RigidEnvs/Throw-v0"], "settings of your own: --conf"),
-        (["train", "--algo", "sac", "-n", "3000"], "learning_starts is 100000, should be below"),
+        (
+            ["train", "--algo", "sac", "--env", "RigidEnvs/Throw-v0"],
+            "to use your own settings: --conf",
+        ),
+        (["train", "--algo", "sac", "-n", "3000"], "learning_starts is 100000, should be less"),
         (["train", "--hyperparams", "policy:MlpPolicy"], "did you mean 'MultiInputPolicy'?"),
         (
             ["train", "--algo", "sac", "--env-kwargs", "reward_type:dense"],
-            "HerReplayBuffer asks for rewards of goals alone: the dense reward needs",
+            "HerReplayBuffer computes rewards from goals alone: the dense reward needs",
         ),
         (["train", "--seed", "-1"], "seed"),
-        (["train", "--config", "nowhere.yaml"], "nowhere.yaml: No such file"),
+        (["train", "--config", "nowhere.yaml"], "nowhere.yaml does not exist; it should be a YAML"),
         (["train", "--hyperparams", "gama:0.9"], "did you mean 'gamma'?"),
         (["train", "--hyperparams", "gamma"], "should be KEY:VALUE"),
         (["train", "--hyperparams", "gamma:2"], "gamma is 2, should be a number above 0"),
         (["train", "--frobnicate"], "unrecognized arguments: --frobnicate"),
-        (["evaluate", "nowhere"], "nowhere does not exist"),
-        (["evaluate", "-f", "nowhere"], "no run of ppo on RigidEnvs/Push-v0 under nowhere"),
+        (["evaluate", "-f", "nowhere"], "no run of ppo on RigidEnvs/Push-v0 in nowhere"),
         (["record", "-f", "nowhere", "--algo", "sac"], "no run of sac"),
-        (["plot", "nowhere"], "progress.csv is missing"),
         (["tune", "--algo", "pp0"], "did you mean 'ppo'?"),
         (["tune", "--n-trials", "0"], "should be an integer of at least 1"),
-        (["tune", "--env-kwargs", "reward_type:denze"], "RigidEnvs/Push-v0 refuses"),
+        (["tune", "--env-kwargs", "reward_type:denze"], "RigidEnvs/Push-v0 rejects"),
         (["tune", "--storage", "nosuch://place"], "storage nosuch://place cannot be used"),
-        (["scripted", "--env", "Nothing-v0"], "no scripted controller"),
+        (["scripted", "--env", "RigidEnvs/Pull-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
+        (["scripted", "--env", "CartPole-v1"], "no scripted controller for environment"),
         (["scripted", "--env-kwargs", "target_jaw:true"], "did you mean 'target_yaw'?"),
         (["scripted", "--env-kwargs", "blocks:3"], "unknown argument 'blocks'"),
         (
@@ -79,7 +81,7 @@ def test_every_command_has_help(command, capsys):
         (["scripted", "--env-kwargs", "target_yaw"], "'target_yaw' should be KEY:VALUE"),
         (
             ["scripted", "--env-kwargs", "seed:3"],
-            "'seed' is none of the environment's: give --seed",
+            "'seed' is not allowed here: use --seed",
         ),
         (
             ["scripted", "--env-kwargs", "max_episode_steps:many"],
@@ -88,14 +90,14 @@ def test_every_command_has_help(command, capsys):
         (["play", "--env-kwargs", "obstacles:5"], "obstacles must be at most 4, got 5"),
         (
             ["play", "--env-kwargs", "render_mode:human"],
-            "'render_mode' is none of the environment's",
+            "'render_mode' is not allowed here: the command sets it",
         ),
-        (["play", "--env-kwargs", "max_episode_steps:many"], "refuses {"),
+        (["play", "--env-kwargs", "max_episode_steps:many"], "rejects {"),
         (["evaluate", "scripted", "--env-kwargs", "obstacles:-1"], "obstacles must be at least 0"),
         (["record", "scripted", "--env-kwargs", "randomize:heavy"], "randomize must be a dict"),
     ],
 )
-def test_mistakes_are_told_in_one_line(words, complaint, capsys, tmp_path, monkeypatch):
+def test_mistakes_are_reported_in_one_line(words, complaint, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main(words) == 2
     shown = capsys.readouterr()
@@ -106,28 +108,57 @@ def test_mistakes_are_told_in_one_line(words, complaint, capsys, tmp_path, monke
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["train", "--resume", "nowhere"],
+        ["evaluate", "nowhere"],
+        ["record", "nowhere"],
+        ["export", "nowhere"],
+        ["plot", "nowhere"],
+        ["results", "nowhere"],
+        ["results", "--repository", "nowhere"],
+        ["train", "--config", "nowhere"],
+    ],
+)
+def test_missing_paths_are_reported_in_the_same_words(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(words) == 2
+    assert capsys.readouterr().err.startswith("error: nowhere does not exist; it should be a ")
+
+
+@pytest.mark.parametrize("command", ["export", "plot", "results", "evaluate", "record"])
+def test_folders_without_a_run_are_reported_in_the_same_words(
+    command, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    assert cli.main([command, "empty"]) == 2
+    assert capsys.readouterr().err == "error: empty is not a run folder: run.json is missing\n"
+
+
 def test_missing_packages_name_the_extra(capsys, monkeypatch):
-    monkeypatch.setattr(cli, "TRAIN_EXTRA", ("no_such_package",))
+    monkeypatch.setattr(extras, "TRAIN_EXTRA", ("no_such_package",))
     assert cli.main(["scripted"]) == 2
-    assert (
-        capsys.readouterr().err
-        == 'error: this command needs no_such_package: pip install "rigid-envs[train]"\n'
+    assert capsys.readouterr().err == (
+        "error: this command requires no_such_package; "
+        'to install: pip install "rigid-envs[train]"\n'
     )
 
 
-def test_defects_of_ours_keep_their_traceback(monkeypatch):
-    def defect(*_):
-        raise ValueError("ours")
+def test_bugs_keep_their_traceback(monkeypatch):
+    def bug(*_):
+        raise ValueError("a bug")
 
-    monkeypatch.setattr(cli, "_scripted", defect)
-    with pytest.raises(ValueError, match="ours"):
+    monkeypatch.setattr(handlers, "scripted", bug)
+    with pytest.raises(ValueError, match="a bug"):
         cli.main(["scripted"])
 
 
-def test_ctrl_c_leaves_with_the_shell_s_status(monkeypatch, capsys):
+def test_ctrl_c_exits_with_status_130(monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_scripted", interrupted)
+    monkeypatch.setattr(handlers, "scripted", interrupted)
     assert cli.main(["scripted"]) == 130
     assert capsys.readouterr().err == "interrupted\n"

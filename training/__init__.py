@@ -1,1 +1,1 @@
-"""Stable-Baselines3 on the environments: adapter, training, evaluation, film and plots."""
+"""Training with Stable-Baselines3: adapter, training, evaluation, video, plots, command line."""

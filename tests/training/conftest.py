@@ -9,7 +9,12 @@ from training.settings.config import PPOConfig, SACConfig
 REACH = "Test/Reach-v0"
 
 if REACH not in gym.registry:
-    gym.register(REACH, entry_point=ReachEnv, vector_entry_point=ReachVectorEnv)
+    gym.register(
+        REACH,
+        entry_point=ReachEnv,
+        vector_entry_point=ReachVectorEnv,
+        kwargs={"task": "reach"},
+    )
 
 
 @pytest.fixture
@@ -36,7 +41,7 @@ def quick_ppo(reach: str) -> PPOConfig:
 
 @pytest.fixture
 def quick_sac(reach: str) -> SACConfig:
-    """A hundred short updates of a small network, with hindsight."""
+    """A hundred short updates of a small network, with HER."""
     return SACConfig(
         env_id=reach,
         n_envs=4,

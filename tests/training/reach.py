@@ -1,7 +1,7 @@
-"""A point that must reach a goal: a small, fast and deliberately unkind vector environment.
+"""A point that must reach a goal: a small and fast vector environment for tests.
 
-It keeps the contract of the real ones, but hands out its own buffers and overwrites them at every
-step, so that an adapter that forgets a copy is caught.
+It has the interface of the real environments, but returns its own buffers and overwrites them at
+each step, so that tests detect a missing copy.
 """
 
 from typing import Any
@@ -25,6 +25,7 @@ class ReachVectorEnv(VectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
+        task: str = "reach",
         reward_type: str = "sparse",
         fidelity: str = "balanced",
         render_mode: str | None = None,

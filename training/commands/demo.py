@@ -1,4 +1,4 @@
-"""The whole way in one command: train, evaluate, film, draw."""
+"""The demo command: trains, evaluates, records a video and plots the learning curve."""
 
 import time
 from pathlib import Path
@@ -20,14 +20,14 @@ def demo(
     device: str = "cpu",
     num_threads: int | None = None,
 ) -> tuple[RunFolder, Evaluation]:
-    """Trains as configured, evaluates, writes a video and a learning curve, and says where.
+    """Trains, evaluates, writes a video and a learning curve, and prints a summary.
 
     Args:
-        config: What to train, and how.
-        log_folder: Where run folders are made.
-        episodes: How many to evaluate on.
+        config: The settings of training.
+        log_folder: Folder for run folders.
+        episodes: Number of episodes of the evaluation.
         device: Torch device of the networks.
-        num_threads: Threads of torch.
+        num_threads: Number of torch threads.
     """
     start = time.perf_counter()
     trained = train(config, log_folder, device=device, num_threads=num_threads)
@@ -39,16 +39,17 @@ def demo(
     print_evaluation(policy, result)
     print(f"success rate    {result.success_at_end.mean():.1%} of {episodes:,} episodes")
     print(f"wall time       {time.perf_counter() - start:.0f} s, training {trained.seconds:.0f} s")
-    for name, path in (("video", video), ("picture", still), ("learning curve", curve)):
+    for name, path in (("video", video), ("still image", still), ("learning curve", curve)):
         print(f"{name:<15} {path}")
     return trained.folder, result
 
 
 def print_training(trained: TrainResult) -> None:
-    """Prints how training went, in a line."""
-    speed = (trained.steps - trained.steps_before) / trained.seconds
+    """Prints the outcome of training in one line, for the whole run if it was resumed."""
+    fraction = trained.environment_time_fraction
+    in_envs = "" if fraction is None else f", {fraction:.0%} of the time in the environments"
     print(
         f"{'interrupted' if trained.interrupted else 'trained'} after {trained.steps:,} steps in "
-        f"{trained.seconds:.0f} s ({speed:,.0f} steps/s, "
-        f"{trained.environment_share:.0%} of the time in the environments): {trained.folder.path}"
+        f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s{in_envs}): "
+        f"{trained.folder.path}"
     )

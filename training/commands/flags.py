@@ -1,4 +1,4 @@
-"""Flags that several commands share, and what their words may be."""
+"""Command-line flags of all commands, and the valid values of their numbers."""
 
 import argparse
 from pathlib import Path
@@ -6,12 +6,12 @@ from typing import NoReturn
 
 from training.settings.errors import UsageError
 
-DEMO_ALGO = "ppo"
-DEMO_ENV = "RigidEnvs/Push-v0"
+DEFAULT_ALGO = "ppo"
+DEFAULT_ENV = "RigidEnvs/Push-v0"
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises the user's mistakes instead of printing the whole usage and leaving."""
+    """Raises UsageError for invalid arguments instead of printing the usage and exiting."""
 
     def error(self, message: str) -> NoReturn:
         """Raises UsageError, whose line the caller prints."""
@@ -19,31 +19,41 @@ class Parser(argparse.ArgumentParser):
 
 
 def add_training(parser: argparse.ArgumentParser) -> None:
-    """What decides a training run, and the machine it runs on."""
+    """Flags for the settings of training, and for the machine."""
     parser.add_argument(
-        "--algo", help=f"algorithm, ppo or sac (default: {DEMO_ALGO}, or that of the run)"
+        "--algo",
+        help=f"algorithm: ppo or sac (default: {DEFAULT_ALGO}; with --resume, that of the run)",
     )
-    parser.add_argument("--env", help=f"environment id (default: {DEMO_ENV}, or that of the run)")
-    parser.add_argument("--config", type=Path, help="YAML file (default: configs/<algo>.yaml)")
-    parser.add_argument("-n", "--n-timesteps", type=count, help="environment steps to train for")
-    parser.add_argument("--n-envs", type=count, help="worlds simulated side by side")
-    parser.add_argument("--seed", type=whole, help="seed of worlds and network")
+    parser.add_argument(
+        "--env",
+        help=f"environment id (default: {DEFAULT_ENV}; with --resume, that of the run)",
+    )
+    parser.add_argument(
+        "--config", type=Path, help="YAML file of settings (default: configs/<algo>.yaml)"
+    )
+    parser.add_argument(
+        "-n", "--n-timesteps", type=count, help="environment steps, summed over worlds"
+    )
+    parser.add_argument("--n-envs", type=count, help="number of worlds simulated in parallel")
+    parser.add_argument("--seed", type=whole, help="seed of worlds, network and sampling")
     parser.add_argument(
         "-params",
         "--hyperparams",
         nargs="+",
         default=[],
         metavar="KEY:VALUE",
-        help="settings over those of the file, as in n_epochs:4 gamma:0.95",
+        help="settings that replace those of the file, as in n_epochs:4 gamma:0.95",
     )
-    parser.add_argument("--num-threads", type=count, help="threads of torch (default: at most 2)")
+    parser.add_argument(
+        "--num-threads", type=count, help="number of torch threads (default: at most 2)"
+    )
     add_folder(parser)
     add_environment(parser)
     add_device(parser)
 
 
 def add_policy(parser: argparse.ArgumentParser) -> None:
-    """What acts, and how."""
+    """Flags for the choice of a policy."""
     parser.add_argument(
         "policy",
         nargs="?",
@@ -56,45 +66,61 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stochastic",
         action="store_true",
-        help="draw actions, not their mean; takes model.zip, and so --trust-pickle",
+        help="sample actions instead of using their mean; reads model.zip, so it requires "
+        "--trust-pickle",
     )
     parser.add_argument(
         "--trust-pickle",
         action="store_true",
-        help="load model.zip, which can run any code in it: only if you trust who made it",
+        help="load model.zip, which can run any code; use it only if you trust its author",
     )
 
 
 def add_latest(parser: argparse.ArgumentParser) -> None:
-    """What finds the latest run, and describes a model.zip that lies in no run folder."""
-    parser.add_argument("--algo", help=f"algorithm, ppo or sac (default: the run's, {DEMO_ALGO})")
-    parser.add_argument("--env", help=f"environment id (default: the run's, {DEMO_ENV})")
+    """Flags that select the latest run, or describe a model.zip outside a run folder."""
+    parser.add_argument(
+        "--algo", help=f"algorithm: ppo or sac (default: that of the policy, or {DEFAULT_ALGO})"
+    )
+    parser.add_argument(
+        "--env", help=f"environment id (default: that of the policy, or {DEFAULT_ENV})"
+    )
     add_folder(parser)
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
-    """What is copied, and where to."""
-    parser.add_argument("policy", nargs="?", metavar="RUN", help="run folder (default: latest)")
+    """Flags of export."""
+    parser.add_argument(
+        "policy", nargs="?", metavar="RUN", help="run folder (default: the latest run)"
+    )
     add_latest(parser)
     parser.add_argument(
-        "-o", "--output", type=Path, help="file to write (default: <run>.policy, in this folder)"
+        "-o",
+        "--output",
+        type=Path,
+        help="file to write (default: <run>.policy in the current folder)",
     )
     parser.add_argument(
-        "-n", "--n-episodes", type=count, help="measure success on as many, and say so in the file"
+        "-n",
+        "--n-episodes",
+        type=count,
+        help="measure the success rate on this many episodes and store it in the file",
     )
     parser.add_argument(
-        "--sb3", action="store_true", help="copy Stable-Baselines3's model and statistics too"
+        "--sb3",
+        action="store_true",
+        help="also copy Stable-Baselines3's model and observation statistics",
     )
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Which runs are drawn, and where to."""
+    """Flags of plot."""
     parser.add_argument(
         "runs",
         nargs="*",
         type=Path,
         metavar="RUN",
-        help="run folder (default: latest); several are drawn with their mean and spread",
+        help="run folder (default: the latest run); several runs are plotted with their mean and "
+        "range",
     )
     parser.set_defaults(policy=None)
     add_latest(parser)
@@ -102,93 +128,114 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         type=Path,
-        help="PNG (default: learning_curve.png in the run folder; of several, beside them)",
+        help="PNG to write (default: learning_curve.png in the run folder; for several runs, a "
+        "file next to their folders)",
     )
 
 
 def add_play(parser: argparse.ArgumentParser) -> None:
-    """What is played, and what of it is shown."""
+    """Flags of play."""
     parser.add_argument(
-        "env", nargs="?", default=DEMO_ENV, help="environment id (default: %(default)s)"
+        "env", nargs="?", default=DEFAULT_ENV, help="environment id (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=whole, help="of the first episode (default: any)")
-    parser.add_argument("--reward", choices=("sparse", "dense"), help="reward to show")
-    parser.add_argument("--blocks", type=count, help="cubes to stack")
+    parser.add_argument("--seed", type=whole, help="seed of the first episode (default: random)")
+    parser.add_argument("--reward", choices=("sparse", "dense"), help="reward type to display")
+    parser.add_argument("--blocks", type=count, help="number of cubes (Stack only)")
     parser.add_argument("--show-forces", action="store_true", help="draw contact forces")
     parser.add_argument(
-        "--show-particles", action="store_true", help="draw what touches, not exact shapes"
+        "--show-particles",
+        action="store_true",
+        help="draw the particles used for contact instead of the exact shapes",
     )
     add_environment(parser)
 
 
 def add_results(parser: argparse.ArgumentParser) -> None:
-    """What is recorded, and where."""
+    """Flags of results."""
     parser.add_argument(
         "runs",
         nargs="*",
         type=Path,
         metavar="RUN",
-        help="run folder (default: all that are finished and not recorded yet)",
+        help="run folder (default: all finished runs that are not recorded yet)",
     )
     add_folder(parser)
     parser.add_argument(
-        "-n", "--n-episodes", type=count, default=1000, help="(default: %(default)s)"
+        "-n",
+        "--n-episodes",
+        type=count,
+        default=1000,
+        help="episodes of each evaluation (default: %(default)s)",
     )
     parser.add_argument(
-        "--replace", action="store_true", help="put these runs in the place of others of their seed"
+        "--replace", action="store_true", help="replace recorded runs that have the same seed"
     )
     parser.add_argument(
-        "--check", action="store_true", help="only say whether the texts are what results/ says"
+        "--check",
+        action="store_true",
+        help="write nothing; fail if docs/results.md or README.md is out of date",
     )
     parser.add_argument(
-        "--repository", type=Path, help="clone that keeps results (default: this one)"
+        "--repository",
+        type=Path,
+        help="clone of this project that stores the results (default: the one of this program)",
     )
 
 
 def add_tuning(parser: argparse.ArgumentParser) -> None:
-    """How much is tried, and where it is kept."""
+    """Flags of tune."""
     parser.add_argument(
         "--n-trials",
         type=count,
         default=50,
-        help="trainings in all, of former commands too (default: %(default)s)",
+        help="number of trials in total, including those of earlier calls (default: %(default)s)",
     )
     parser.add_argument(
         "--n-episodes",
         type=count,
         default=1000,
-        help="to measure each policy on (default: %(default)s)",
+        help="episodes of each evaluation (default: %(default)s)",
     )
     parser.add_argument(
         "--storage",
-        help="SQLite file or URL of a database (default: <environment>_tuning.db among the runs)",
+        help="SQLite file or database URL (default: <environment>_tuning.db in the folder of runs)",
     )
-    parser.add_argument("--study-name", help="of the study in it (default: <algo>-<environment>)")
+    parser.add_argument(
+        "--study-name", help="name of the study in the database (default: <algo>-<environment>)"
+    )
 
 
 def add_folder(parser: argparse.ArgumentParser) -> None:
-    """Where runs are kept."""
+    """The flag for the folder of runs."""
     parser.add_argument(
         "-f",
         "--log-folder",
         type=Path,
         default=Path("runs"),
-        help="where run folders are (default: %(default)s)",
+        help="folder of the run folders (default: %(default)s)",
     )
 
 
 def add_episodes(parser: argparse.ArgumentParser, default: int) -> None:
-    """How many episodes to play, from which seed, on which environment."""
+    """Flags for episodes to play: their number, seeds and environment."""
     parser.add_argument(
-        "-n", "--n-episodes", type=count, default=default, help="(default: %(default)s)"
+        "-n",
+        "--n-episodes",
+        type=count,
+        default=default,
+        help="number of episodes (default: %(default)s)",
     )
-    parser.add_argument("--seed", type=whole, help="of the first episode (default: 1000000)")
+    parser.add_argument("--seed", type=whole, help="seed of the first episode (default: 1000000)")
     add_environment(parser)
 
 
 def add_environment(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the environment."""
-    parser.add_argument("--fidelity", help="fidelity preset (default: as configured)")
+    """Flags for arguments of the environment."""
+    parser.add_argument(
+        "--fidelity",
+        help="fidelity preset: fast, balanced, accurate or solid (default: as in the settings or "
+        "the policy, otherwise balanced)",
+    )
     parser.add_argument(
         "--env-kwargs",
         nargs="+",
@@ -199,19 +246,19 @@ def add_environment(parser: argparse.ArgumentParser) -> None:
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
-    """Where networks run."""
+    """The flag for the device of the networks."""
     parser.add_argument(
         "--device", default="cpu", help="torch device of the networks (default: %(default)s)"
     )
 
 
 def count(text: str) -> int:
-    """Reads an integer of at least 1; 1e6 and 1_000_000 are fine."""
+    """Parses an integer of at least 1; 1e6 and 1_000_000 are valid."""
     return _integer(text, 1)
 
 
 def whole(text: str) -> int:
-    """Reads an integer of at least 0."""
+    """Parses an integer of at least 0."""
     return _integer(text, 0)
 
 

@@ -1,4 +1,4 @@
-"""Play: a window in which the keyboard drives an environment's tool."""
+"""The play command: a window in which the keyboard controls the finger or gripper."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import closing
@@ -12,9 +12,9 @@ from training.settings.errors import UsageError
 
 Array = np.ndarray
 
-# pixels of the picture, larger than a film's
+# pixels, width and height of the frame; larger than that of a video
 SIZE = 720
-# by pygame's names: what moves the tool as its picture shows it (right, away, up)
+# directions in the frame (right, away from the camera, up) by pygame's names of keys
 MOVES: dict[str, tuple[int, int, int]] = {
     **dict.fromkeys(("right", "d"), (1, 0, 0)),
     **dict.fromkeys(("left", "a"), (-1, 0, 0)),
@@ -25,10 +25,10 @@ MOVES: dict[str, tuple[int, int, int]] = {
 }
 FAST, GRIP = ("left shift", "right shift"), ("space",)
 RESET, QUIT = ("n", "backspace"), ("escape",)
-# shares of the full action: the whole of it is too much to place a cube
+# fractions of the full action: the full action is too fast to place a cube
 PACE, FAST_PACE = 0.3, 1.0
-# m between the pads under which a hand holds something at the start
-HELD = 0.06
+# m, initial distance between the pads below which the gripper holds an object
+HOLDING_OPENING = 0.06
 HELP = (
     "arrows or WASD: move      page up, page down or R, F: up and down      shift: fast",
     "space: open or close the gripper      N or backspace: new episode      Esc: quit",
@@ -36,13 +36,14 @@ HELP = (
 
 
 def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: float) -> Array:
-    """The action that the keys held down ask for.
+    """The action for the keys that are held down.
 
     Args:
-        held: names of keys.
-        components: of the action: displacement along x, y, z, and after it, if there is one, grip.
-        closed: whether the gripper shall be closed.
-        azimuth: degrees of the camera; keys go along the axes that its picture shows that way.
+        held: Names of the keys.
+        components: Number of components of the action: displacement along x, y, z, then grip.
+        closed: Whether to close the gripper.
+        azimuth: Azimuth of the camera in degrees; keys move along the axis that is nearest to the
+            direction in the frame.
 
     Returns:
         [components] float32 within [-1, 1].
@@ -50,7 +51,7 @@ def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: fl
     held = set(held)
     moves = [MOVES[key] for key in held & MOVES.keys()]
     right, away, up = np.clip(np.sum(moves, axis=0) if moves else np.zeros(3), -1.0, 1.0)
-    # at -90 degrees x points to the right and y into the picture; others are quarter turns of it
+    # at -90 degrees x points to the right of the frame and y away; round to quarter turns of this
     turn = np.radians(90.0 * np.round((azimuth + 90.0) / 90.0))
     cos, sin = np.round(np.cos(turn)), np.round(np.sin(turn))
     move = np.array([cos * right - sin * away, sin * right + cos * away, up])
@@ -61,11 +62,11 @@ def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: fl
 
 
 class Game:
-    """An environment that keys drive, step by step.
+    """An environment that is controlled by keys, step by step.
 
     Args:
-        env: a single environment of `rigid_envs`.
-        seed: of the first episode; any if None.
+        env: A single environment of `rigid_envs`.
+        seed: Seed of the first episode; random if None.
     """
 
     def __init__(self, env: Any, seed: int | None = None) -> None:
@@ -73,61 +74,61 @@ class Game:
         self.env, self.held, self.quit = env, set[str](), False
         self._components = env.action_space.shape[0]
         self._task = env.unwrapped.task
-        self.begin(seed)
+        self.start_episode(seed)
 
-    def begin(self, seed: int | None = None) -> None:
-        """Starts an episode: the seed's first, or the next one."""
+    def start_episode(self, seed: int | None = None) -> None:
+        """Starts the first episode of a seed, or the next episode."""
         observation, info = self.env.reset(seed=seed)
         names = [bound[0] for bound in self._task.bounds]
         opening = observation["observation"][names.index("opening")] if "opening" in names else 1.0
-        self.closed = bool(opening < HELD)
+        self.closed = bool(opening < HOLDING_OPENING)
         self.steps, self.reward, self.total = 0, 0.0, 0.0
         self.solved = bool(info["is_success"])
 
     def press(self, keys: Iterable[Key]) -> None:
-        """Takes note of keys that went down or up, and does at once what they ask for."""
+        """Processes keys that were pressed or released."""
         for key in keys:
             (self.held.add if key.down else self.held.discard)(key.name)
             if key.down and key.name in GRIP:
                 self.closed = not self.closed
             elif key.down and key.name in RESET:
-                self.begin()
+                self.start_episode()
             elif key.down and key.name in QUIT:
                 self.quit = True
 
     def step(self) -> None:
-        """Advances by a frame; an episode that ends is followed by the next."""
+        """Advances by a step; starts the next episode at the end of one."""
         azimuth = self._task.camera.azimuth
         action = action_of(self.held, self._components, closed=self.closed, azimuth=azimuth)
         _, reward, terminated, truncated, info = self.env.step(action)
         self.steps, self.reward, self.total = self.steps + 1, reward, self.total + reward
         self.solved = bool(info["is_success"])
         if terminated or truncated:
-            self.begin()
+            self.start_episode()
 
     @property
     def text(self) -> tuple[str, ...]:
-        """What to write below the picture."""
-        state = f"step {self.steps}      reward {self.reward:+.2f}      total {self.total:+.1f}"
+        """The lines below the frame."""
+        state = f"step {self.steps}      reward {self.reward:+.2f}      return {self.total:+.1f}"
         return (state + ("      SOLVED" if self.solved else ""), *HELP)
 
 
 def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwargs: Any) -> int:
-    """Opens a window and lets its user play until it is closed.
+    """Opens a window and runs until it is closed.
 
-    Episodes have no limit of steps unless `env_kwargs` hold one.
+    Episodes have no step limit unless `env_kwargs` sets `max_episode_steps`.
 
     Args:
-        env_id: Environment.
-        seed: Of the first episode; any if None.
-        fps: Frames a second, which is the pace of the world too.
+        env_id: Environment id.
+        seed: Seed of the first episode; random if None.
+        fps: Frames per second; one frame is one step.
         env_kwargs: Arguments of the environment.
 
     Returns:
-        How many steps were played.
+        The number of steps played.
 
     Raises:
-        UsageError: The id or an argument is wrong, or there is no display.
+        UsageError: The id or an argument is invalid, or there is no display.
     """
     arguments = {"max_episode_steps": -1, "render_size": SIZE, **env_kwargs}
     env = make_single_env(env_id, render_mode="rgb_array", **arguments)
@@ -136,19 +137,19 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
     with closing(env), closing(window):
         game = Game(env, seed)
         while not (window.closed or game.quit):
-            picture: Any = env.render()
-            game.press(_show(window, picture, game.text))
+            frame: Any = env.render()
+            game.press(_show(window, frame, game.text))
             if not (window.closed or game.quit):
                 game.step()
                 played += 1
     return played
 
 
-def _show(window: Window, picture: Array, text: Sequence[str]) -> list[Key]:
+def _show(window: Window, frame: Array, text: Sequence[str]) -> list[Key]:
     pygame = load_pygame()
     try:
-        return window.show(picture, text)
+        return window.show(frame, text)
     except NoDisplay:
-        raise UsageError("no window can be opened: there is no display") from None
+        raise UsageError("cannot open a window: there is no display") from None
     except pygame.error as error:
-        raise UsageError(f"no window can be opened: {error}") from None
+        raise UsageError(f"cannot open a window: {error}") from None

@@ -1,7 +1,7 @@
-"""Searches settings: many short trainings, of which the poor ones are cut short.
+"""The tune command: searches settings by many short trials and stops poor trials early.
 
-All trials are kept in a database, an SQLite file if nothing else is said. The same command goes on
-where it ended, whatever ended it; several processes may work on one study.
+All trials are stored in a database, by default an SQLite file. The same command resumes an
+interrupted search, and several processes may work on one study.
 """
 
 import json
@@ -27,47 +27,52 @@ from training.settings.environments import make_vector_env
 from training.settings.errors import UsageError
 from training.settings.search_space import draw, with_drawn
 
-PART = 10
-"""A trial takes a tenth of the steps that the settings have, unless told otherwise."""
-LOOKS = 10
-"""Times that a trial is compared with others before it ends."""
-FIRST_LOOKS = 2
-"""Of them, those that cut nothing short: early success says little."""
-TRIALS_BEFORE_CUTS = 5
-"""Complete trials before any is cut short, for a median of fewer says little."""
+STEPS_DIVISOR = 10
+"""By default a trial has this fraction, a tenth, of the steps in the settings."""
+INTERMEDIATE_REPORTS = 10
+"""Number of intervals of a trial; at the end of each but the last, it is compared with others."""
+WARMUP_REPORTS = 2
+"""Number of first comparisons that do not stop a trial: early success rates mean little."""
+STARTUP_TRIALS = 5
+"""Number of complete trials before any is stopped: the median of fewer trials means little."""
 FIRST_SEED = 2_000_000
-"""Of the episodes to choose by: others than those that results are measured on."""
+"""First seed of the evaluation, whose episodes differ from those of the recorded results."""
 SEED_LIMIT = 2**32
-"""Seeds of the search are below it."""
+"""Upper bound of the sampler's seed."""
 FAILURE = "failure"
-"""Attribute of a trial that diverged; those that were interrupted have none, and are repeated."""
+"""Attribute of a trial that diverged. Interrupted trials do not have it and are repeated."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a search has found so far."""
+    """Outcome of a search so far."""
 
     settings: TrainConfig | None
     """The best settings; None if no trial is complete."""
     summary: str
-    """How well they did, and out of how many, in a line."""
+    """One line: the number of trials, and the best success rate."""
     interrupted: bool
     """Whether Ctrl-C ended the search."""
 
 
-class Look(BaseCallback):
-    """Reports the success rate at parts of a trial, and ends trials that do worse than most."""
+class Pruning(BaseCallback):
+    """Reports intermediate success rates of a trial, and stops it if most others are better.
+
+    Args:
+        trial: The trial.
+        steps: Environment steps of the trial.
+    """
 
     def __init__(self, trial: optuna.Trial, steps: int):
         super().__init__()
         self.trial = trial
         self.steps = steps
-        self.looks = 0
+        self.reports = 0
 
     def _on_step(self) -> bool:
-        due = LOOKS * self.num_timesteps // self.steps
-        if self.looks < due < LOOKS:
-            self.looks = due
+        due = INTERMEDIATE_REPORTS * self.num_timesteps // self.steps
+        if self.reports < due < INTERMEDIATE_REPORTS:
+            self.reports = due
             self.trial.report(success_rate(self.model) or 0.0, due)
             if self.trial.should_prune():
                 raise optuna.TrialPruned
@@ -85,24 +90,25 @@ def tune(
     device: str = "cpu",
     num_threads: int | None = None,
 ) -> Tuned:
-    """Trains with settings drawn from `search_space.SPACES`, as many times as asked.
+    """Trains repeatedly with settings sampled from `search_space.SPACES`.
 
-    What is tried later follows what did well (TPE). Trial n trains with the seed of `config` plus
-    n, and counts as good as the share of episodes that its policy ends in success.
+    Later samples depend on the earlier trials (tree-structured Parzen estimator, TPE). Trial n has
+    the seed of `config` plus n. Its value is the fraction of evaluation episodes that end in
+    success.
 
     Args:
-        config: Settings that are not searched; its steps are those of a trial.
-        log_folder: Where run folders are, and the database beside them; trials leave none.
-        trials: How many in all, with those of former calls.
-        episodes: How many to measure a policy on.
+        config: The settings that are not searched, and the steps of a trial.
+        log_folder: Folder of the run folders, for the database; trials leave no run folder.
+        trials: Number of trials in total, including those of earlier calls.
+        episodes: Number of episodes of each evaluation.
         storage: An SQLite file, or the URL of a database.
-        study_name: Its name in the database.
+        study_name: Name of the study in the database.
         device: Torch device of the networks.
-        num_threads: Threads of torch.
+        num_threads: Number of torch threads.
 
     Raises:
-        UsageError: The environment refuses its arguments, the database cannot be used, the study
-            was begun with other settings, or every trial has failed.
+        UsageError: The environment rejects its arguments, the database cannot be used, the study
+            was started with other settings, or every trial has failed.
     """
     make_vector_env(config.env_id, 1, **config.env_kwargs).close()
     study = _study(config, log_folder, storage, study_name, episodes)
@@ -113,11 +119,11 @@ def tune(
             value = _success(config, trial, episodes, device, num_threads)
         except optuna.TrialPruned:
             study.tell(trial, state=TrialState.PRUNED)
-            outcome = "cut short"
+            outcome = "stopped early"
         except KeyboardInterrupt:
             study.tell(trial, state=TrialState.FAIL)
             interrupted, outcome = True, "interrupted"
-        except ValueError as error:  # torch's, of numbers that are not finite, or ours
+        except ValueError as error:  # not finite: raised by torch or by this project
             trial.set_user_attr(FAILURE, str(error))
             study.tell(trial, state=TrialState.FAIL)
             outcome = f"failed: {' '.join(str(error).split()):.100}"
@@ -131,8 +137,8 @@ def tune(
         )
     complete = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
     if not complete and not interrupted:
-        last = _done(study)[-1].user_attrs.get(FAILURE, "nothing")
-        raise UsageError(f"none of {trials} trials came to an end; the last said: {last}")
+        last = _done(study)[-1].user_attrs.get(FAILURE, "unknown")
+        raise UsageError(f"all {trials} trials failed; the error of the last one: {last}")
     best = with_drawn(config, study.best_trial.params) if complete else None
     return Tuned(best, _summary(study), interrupted)
 
@@ -144,7 +150,7 @@ def _success(
     device: str,
     num_threads: int | None,
 ) -> float:
-    """Trains a trial and measures its policy."""
+    """Trains with the settings of a trial and returns the success rate of the policy."""
     drawn = with_drawn(config, draw(config.algo, trial))
     seed = (config.seed or 0) + trial.number
     drawn = drawn.replace("search", seed=seed, target_success_rate=None)
@@ -154,9 +160,9 @@ def _success(
             Path(folder),
             device=device,
             num_threads=num_threads,
-            save_every=2 * config.n_timesteps,  # at its end alone
+            save_every=2 * config.n_timesteps,  # only at the end
             quiet=True,
-            callbacks=[Look(trial, config.n_timesteps)],
+            callbacks=[Pruning(trial, config.n_timesteps)],
         )
         if trained.interrupted:
             raise KeyboardInterrupt
@@ -172,10 +178,10 @@ def _study(
     study_name: str | None,
     episodes: int,
 ) -> optuna.Study:
-    """Opens or begins a study.
+    """Opens or creates a study.
 
     Raises:
-        UsageError: The database cannot be used, or the study was begun with other settings.
+        UsageError: The database cannot be used, or the study was started with other settings.
     """
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     default = log_folder / config.algo / f"{folder_name(config.env_id)}_tuning.db"
@@ -188,21 +194,22 @@ def _study(
         study = optuna.create_study(
             storage=where, study_name=name, direction="maximize", load_if_exists=True
         )
-    except Exception as error:  # whatever a database makes its driver raise
-        said = str(error).splitlines()[0] if str(error) else repr(error)
-        raise UsageError(f"storage {storage or default} cannot be used: {said}") from error
-    begun = {"algo": config.algo, "env_id": config.env_id, "episodes": episodes}
-    _check_begun_alike(study, {**config.as_mapping(), **begun})
-    seed = ((config.seed or 0) + len(study.trials)) % SEED_LIMIT  # else it draws the same again
-    running = any(trial.state == optuna.trial.TrialState.RUNNING for trial in study.trials)
-    # beside another process, which began at as many trials, chance alone keeps the two apart
+    except Exception as error:  # a database driver can raise any exception
+        message = str(error).splitlines()[0] if str(error) else repr(error)
+        raise UsageError(f"storage {storage or default} cannot be used: {message}") from error
+    identity = {"algo": config.algo, "env_id": config.env_id, "episodes": episodes}
+    _check_same_settings(study, {**config.as_mapping(), **identity})
+    # another seed at each call, otherwise the same values would be sampled again
+    seed = ((config.seed or 0) + len(study.trials)) % SEED_LIMIT
+    running = any(trial.state == TrialState.RUNNING for trial in study.trials)
+    # a process that runs at the same time may have the same number of trials: no seed then
     study.sampler = optuna.samplers.TPESampler(seed=None if running else seed)
-    study.pruner = optuna.pruners.MedianPruner(TRIALS_BEFORE_CUTS, FIRST_LOOKS + 1)
+    study.pruner = optuna.pruners.MedianPruner(STARTUP_TRIALS, WARMUP_REPORTS + 1)
     return study
 
 
-def _check_begun_alike(study: optuna.Study, settings: dict[str, Any]) -> None:
-    """Raises UsageError unless the study's trials were made with these settings."""
+def _check_same_settings(study: optuna.Study, settings: dict[str, Any]) -> None:
+    """Raises UsageError if the study was started with other settings."""
     if "settings" not in study.user_attrs:
         study.set_user_attr("settings", json.dumps(settings))
         return
@@ -210,18 +217,18 @@ def _check_begun_alike(study: optuna.Study, settings: dict[str, Any]) -> None:
     for name, value in json.loads(json.dumps(settings)).items():
         if name in before and before[name] != value:
             raise UsageError(
-                f"{name} is {value!r}, but study {study.study_name!r} was begun with "
-                f"{before[name]!r}: keep that, or give another --study-name"
+                f"{name} is {value!r}, but study {study.study_name!r} was started with "
+                f"{before[name]!r}: use that value, or another --study-name"
             )
 
 
 def _done(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:
-    """Trials that need no repetition."""
-    over = (TrialState.COMPLETE, TrialState.PRUNED)
+    """Trials that are not to be repeated: complete, stopped early or diverged."""
+    finished = (TrialState.COMPLETE, TrialState.PRUNED)
     return [
         trial
         for trial in study.get_trials(deepcopy=False)
-        if trial.state in over or FAILURE in trial.user_attrs
+        if trial.state in finished or FAILURE in trial.user_attrs
     ]
 
 

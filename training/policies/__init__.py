@@ -1,1 +1,1 @@
-"""Policies as functions, and the files that hold them."""
+"""Policies as functions, and the files that store them."""

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's class of each algorithm."""
+"""Stable-Baselines3's class for each algorithm."""
 
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm

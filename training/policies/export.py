@@ -1,4 +1,4 @@
-"""From Stable-Baselines3 to a policy file: what the actor's layers hold, and nothing else."""
+"""Writes policy files from Stable-Baselines3 models: the actor's layers and their statistics."""
 
 import dataclasses
 import re
@@ -18,7 +18,7 @@ from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import GoalOffsets
 from training.policies.policy_file import SUFFIX, PolicyFile, load_policy_file
 from training.policies.policy_header import Environment, Header, Network, Normalization, Success
-from training.runs.run_folder import RunFolder, git_commit, package_versions, written_whole
+from training.runs.run_folder import RunFolder, atomic_write, git_commit, package_versions
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
 
@@ -28,33 +28,33 @@ ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu", torch.nn.ELU: "elu"
 def write_policy(
     path: Path, model: BaseAlgorithm, config: TrainConfig, success: Success | None = None
 ) -> None:
-    """Writes a policy file, whole or not at all.
+    """Writes a policy file; if that fails, no file is left.
 
     Args:
         path: The file.
-        model: A model of PPO or SAC, with its statistics of observations if it has any.
-        config: What it was trained with.
-        success: How well it does, if that was measured.
+        model: A PPO or SAC model, with its observation statistics if it has any.
+        config: Its settings.
+        success: Measured success of the policy, if any.
 
     Raises:
-        UsageError: The model has parts that a policy file does not describe.
+        UsageError: The model has parts that a policy file cannot describe.
         OSError: The file cannot be written.
     """
     data = policy_file_of(model, config, success).to_bytes()
-    with written_whole(path) as file:
+    with atomic_write(path) as file:
         file.write(data)
 
 
 def export_run(
     folder: RunFolder, output: Path, *, success: Success | None = None, sb3: bool = False
 ) -> list[Path]:
-    """Copies the policy out of a run folder.
+    """Copies the policy of a run folder into one file.
 
     Args:
         folder: The run.
-        output: The file to write, which should end in .policy.
-        success: A measurement to write into it.
-        sb3: Copy Stable-Baselines3's own files too, under the same name: .zip and .pkl.
+        output: The file to write, with the suffix .policy.
+        success: Measured success to store in the file.
+        sb3: Also copy Stable-Baselines3's files, under the same name with .zip and .pkl.
 
     Returns:
         The files written.
@@ -66,7 +66,7 @@ def export_run(
         raise UsageError(f"output is {str(output)!r}, should end in {SUFFIX}")
     folder.config()
     if not folder.policy.exists():
-        raise UsageError(f"{folder.path} holds no policy yet: {folder.policy.name} is missing")
+        raise UsageError(f"{folder.path} has no checkpoint yet: {folder.policy.name} is missing")
     content = load_policy_file(folder.policy)
     if success is not None:
         header = dataclasses.replace(content.header, success=success)
@@ -74,7 +74,7 @@ def export_run(
     written = [output]
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
-        with written_whole(output) as file:
+        with atomic_write(output) as file:
             file.write(content.to_bytes())
         if sb3:
             for source, suffix in ((folder.model, ".zip"), (folder.normalization, ".pkl")):
@@ -88,20 +88,22 @@ def export_run(
 def policy_file_of(
     model: BaseAlgorithm, config: TrainConfig, success: Success | None = None
 ) -> PolicyFile:
-    """The content of a policy file; arguments and errors as of `write_policy`."""
+    """The content of a policy file; arguments and errors as for `write_policy`."""
     space, actions = model.observation_space, model.action_space
     if not isinstance(space, spaces.Dict) or not isinstance(actions, spaces.Box):
-        raise UsageError(f"policy files hold observations by key and real actions, not {space}")
+        raise UsageError(
+            f"policy files support dict observations and box actions, not {space}, {actions}"
+        )
     layers, activation = _layers(model)
-    env_id = config.env_id.rpartition(":")[2]  # before it stands the module that registers it
+    env_id = config.env_id.rpartition(":")[2]  # without "module:"
     version = re.search(r"-v(\d+)$", env_id)
     if version is None:
-        raise UsageError(f"environment id is {env_id!r}, should end in a version, as -v0")
+        raise UsageError(f"environment id is {env_id!r}, should end in a version such as -v0")
     normalization = model.get_vec_normalize_env()
     scaling, mean, variance = _statistics(normalization)
     header = Header(
         algorithm=config.algo,
-        environment=Environment(env_id, int(version[1]), config.last_env_kwargs),
+        environment=Environment(env_id, int(version[1]), config.final_env_kwargs),
         observation={key: tuple(one.shape or ()) for key, one in space.spaces.items()},
         network=Network(
             widths=[layers[0][0].shape[1], *(len(biases) for _, biases in layers)],
@@ -121,14 +123,14 @@ def policy_file_of(
 
 
 def _squashing(policy: Any) -> str:
-    """How the header names what becomes of the last layer's output."""
+    """How the last layer's output becomes an action, as the header names it."""
     if isinstance(policy, BoundedPolicy):
         return "softsign"
     return "tanh" if isinstance(policy, SACPolicy) else "clip"
 
 
 def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], str]:
-    """The actor's weights and biases layer by layer, and the name of what stands between them."""
+    """The actor's weights and biases by layer, and the name of the activation."""
     policy: Any = model.policy
     if isinstance(model, PPO):
         extractor = policy.pi_features_extractor
@@ -137,23 +139,25 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
         extractor = policy.actor.features_extractor
         modules = [*policy.actor.latent_pi, policy.actor.mu]
     else:
-        raise UsageError(f"policy files hold PPO and SAC, not {type(model).__name__}")
+        raise UsageError(f"policy files support PPO and SAC, not {type(model).__name__}")
     between = [module for module in modules if not isinstance(module, torch.nn.Linear)]
     kinds = {type(module) for module in between}
     offsets = isinstance(extractor, GoalOffsets)
     flat = offsets or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
     alternate = len(modules) == 2 * len(between) + 1
     if not flat or not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
-        raise UsageError(f"policy files hold layers with tanh, relu or elu, not {modules}")
+        raise UsageError(
+            f"policy files support linear layers with tanh, relu or elu, not {modules}"
+        )
     linear = [module for module in modules if isinstance(module, torch.nn.Linear)]
     layers = [(_numbers(one.weight), _numbers(one.bias)) for one in linear]
-    if offsets:  # linear too, so both make one layer
+    if offsets:  # a linear map: merge it into the first layer
         layers[0] = (_numbers(linear[0].weight.double() @ extractor.matrix.double()), layers[0][1])
     return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh"
 
 
 def _statistics(env: VecNormalize | None) -> tuple[Normalization | None, Any, Any]:
-    """How observations are scaled, their means and variances by key."""
+    """The scaling of observations, and their means and variances by key."""
     if env is None or not env.norm_obs:
         return None, {}, {}
     assert isinstance(env.obs_rms, dict)

@@ -1,4 +1,4 @@
-"""A policy of SAC that sees how far the goal is."""
+"""A SAC policy that observes the desired goal relative to the achieved one."""
 
 from typing import Any
 
@@ -11,22 +11,21 @@ from stable_baselines3.sac.policies import MultiInputPolicy
 from training.settings.errors import UsageError
 
 SCALE = 10.0
-"""Of goals and ways to them: those of a tabletop are tenths of a metre. What a goal has beside
-places, as whether a cube is let go, weighs the more for it."""
+"""Factor of goals and goal offsets. Positions on a tabletop are tenths of a metre; the factor also
+gives more weight to other goal components, such as "released" of Stack."""
 
 
 class GoalOffsets(BaseFeaturesExtractor):
-    """The observation, the way from achieved to desired goal, and the desired goal.
+    """Features: the observation, desired minus achieved goal, and the desired goal.
 
-    Stable-Baselines3's own extractor hands both goals on as they are. Then each of the first
-    layer's units has to find out for each component that only their difference counts, to a
-    precision of centimetres in numbers of tenths. Hindsight puts other desired goals in place, and
-    what is made of them here follows.
+    Stable-Baselines3's extractor passes both goals unchanged. Then each unit of the first layer has
+    to learn, for each component, that only the difference matters, with centimetre precision in
+    numbers of tenths of a metre. The features stay correct when HER replaces the desired goal.
 
-    It is a linear map without anything to learn, so that a policy file holds it in its first layer.
+    The map is linear and has no parameters, so a policy file stores it in the first layer.
 
     Args:
-        space: Of a goal environment.
+        space: Observation space of a goal environment.
 
     Raises:
         UsageError: The space has no goals.
@@ -37,19 +36,19 @@ class GoalOffsets(BaseFeaturesExtractor):
     def __init__(self, space: spaces.Dict):
         sizes = {key: int(np.prod(one.shape or ())) for key, one in space.spaces.items()}
         if set(sizes) != {"observation", "achieved_goal", "desired_goal"}:
-            raise UsageError(f"OffsetPolicy takes observations with goals, not {space}")
-        seen, goal = sizes["observation"], sizes["desired_goal"]
-        super().__init__(space, seen + 2 * goal)
+            raise UsageError(f"OffsetPolicy requires observations with goals, not {space}")
+        observed, goal = sizes["observation"], sizes["desired_goal"]
+        super().__init__(space, observed + 2 * goal)
         self.keys = list(sizes)
         ends = np.cumsum(list(sizes.values()))
         first = dict(zip(sizes, ends - list(sizes.values()), strict=True))
-        matrix = torch.zeros(seen + 2 * goal, int(ends[-1]))
-        for row in range(seen):
+        matrix = torch.zeros(observed + 2 * goal, int(ends[-1]))
+        for row in range(observed):
             matrix[row, first["observation"] + row] = 1.0
         for row in range(goal):
-            matrix[seen + row, first["desired_goal"] + row] = SCALE
-            matrix[seen + row, first["achieved_goal"] + row] = -SCALE
-            matrix[seen + goal + row, first["desired_goal"] + row] = SCALE
+            matrix[observed + row, first["desired_goal"] + row] = SCALE
+            matrix[observed + row, first["achieved_goal"] + row] = -SCALE
+            matrix[observed + goal + row, first["desired_goal"] + row] = SCALE
         self.register_buffer("matrix", matrix)
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
@@ -59,11 +58,11 @@ class GoalOffsets(BaseFeaturesExtractor):
 
 
 class OffsetPolicy(MultiInputPolicy):
-    """Stable-Baselines3's policy of SAC for goal environments, which sees what `GoalOffsets` tells.
+    """Stable-Baselines3's SAC policy for goal environments, with `GoalOffsets` as its features.
 
     Args:
-        *args: As of Stable-Baselines3's policy.
-        **kwargs: Likewise.
+        *args: As for Stable-Baselines3's policy.
+        **kwargs: As for Stable-Baselines3's policy.
     """
 
     def __init__(self, *args: Any, **kwargs: Any):

@@ -1,4 +1,4 @@
-"""A policy to evaluate or film: a trained one or a scripted one, behind one signature."""
+"""The interface of a policy, trained or scripted, for evaluation and video."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -6,42 +6,39 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from training.scripted import CONTROLLERS, Controller
-from training.settings.errors import UsageError, nearest
+from training.scripted import Controller, controller_for
 
 SCRIPTED = "scripted"
 
 
 @dataclass(frozen=True)
 class Policy:
-    """What acts, and on what."""
+    """A function from observations to actions, and the environment that it is for."""
 
     act: Controller
-    """Takes observations, a dict of (n, k) arrays, returns actions (n, action_dim)."""
+    """Takes observations, a dict of (n, k) arrays; returns actions (n, action_dim)."""
     env_id: str
-    """Environment that it acts on."""
+    """Environment id."""
     name: str
-    """What to call it in tables and titles."""
+    """Name in tables and titles."""
     env_kwargs: dict[str, Any] = field(default_factory=dict)
-    """Arguments of the environment that it was trained on, or written for."""
+    """Arguments of the environment that the policy was trained or written for."""
     folder: Path | None = None
-    """Where it is kept; None for a scripted one."""
+    """Folder that holds the policy; None for a scripted one."""
 
 
 def scripted_policy(env_id: str, **env_kwargs: Any) -> Policy:
     """The scripted controller of an environment.
 
     Args:
-        env_id: Environment.
-        env_kwargs: Its arguments; a controller with parameters of the same name is told them, as
-            Push's is of `obstacles`, which no observation shows.
+        env_id: Environment id.
+        env_kwargs: Arguments of the environment. Those that the controller has parameters for are
+            passed to it as well, as `obstacles` of Push, which is not observed.
 
     Raises:
-        UsageError: It has none.
+        UsageError: The id is unknown, or its task has no controller.
     """
-    if env_id not in CONTROLLERS:
-        hint = f"; did you mean {nearest(env_id, CONTROLLERS)!r}?" if CONTROLLERS else ""
-        raise UsageError(f"no scripted controller for environment {env_id!r}{hint}")
-    controller = CONTROLLERS[env_id]
-    told = {k: v for k, v in env_kwargs.items() if k in signature(controller).parameters}
-    return Policy(partial(controller, **told), env_id, SCRIPTED, env_kwargs)
+    controller = controller_for(env_id)
+    parameters = signature(controller).parameters
+    passed = {name: value for name, value in env_kwargs.items() if name in parameters}
+    return Policy(partial(controller, **passed), env_id, SCRIPTED, env_kwargs)

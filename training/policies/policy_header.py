@@ -1,4 +1,4 @@
-"""The header of a policy file: its fields, and a reader that believes nothing."""
+"""The header of a policy file: its fields, and a reader that validates every value."""
 
 import json
 import math
@@ -7,36 +7,36 @@ from dataclasses import dataclass
 from typing import Any
 
 SQUASHING = {"ppo": ("clip", "softsign"), "sac": ("tanh",)}
-"""By algorithm, how the network's output may become an action: cut to its bounds, or squashed."""
+"""How the network's output becomes an action, by algorithm: clipped to the bounds, or squashed."""
 ACTIVATION_NAMES = ("tanh", "relu", "elu")
 
 
-class Misfit(ValueError):
-    """A header that cannot be; the message names the field and what would be right."""
+class InvalidHeader(ValueError):
+    """The header is invalid; the message names the field and valid values."""
 
 
 @dataclass(frozen=True)
 class Environment:
-    """What the policy was trained on."""
+    """The environment of training."""
 
     id: str
     """Environment id, as in RigidEnvs/Push-v0."""
     version: int
-    """The number behind its -v: another one behaves otherwise."""
+    """The number after "-v"; another version behaves differently."""
     kwargs: dict[str, Any]
     """Its arguments."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """How an observation becomes an action."""
+    """The network from observations to actions."""
 
     widths: list[int]
-    """Of all layers, from all observations' numbers to the action's."""
+    """Width of each layer, from the size of all observations to the size of the action."""
     activation: str
-    """Between layers: tanh, relu or elu."""
+    """Activation between layers: tanh, relu or elu."""
     squashing: str
-    """Of the output: "clip" to the bounds, or "tanh" or "softsign" and stretched to the bounds."""
+    """From output to action: "clip" to the bounds; "tanh" or "softsign", scaled to the bounds."""
     low: list[float]
     """Lower bounds of the action."""
     high: list[float]
@@ -45,70 +45,70 @@ class Network:
 
 @dataclass(frozen=True)
 class Normalization:
-    """How observations are scaled: (x - mean) / √(variance + epsilon), cut to ±clip."""
+    """Scaling of observations: (x - mean) / √(variance + epsilon), clipped to ±clip."""
 
     keys: list[str]
-    """Observations that are scaled, in the order of their statistics in the file."""
+    """Scaled observation keys, in the order of their statistics in the file."""
     epsilon: float
-    """Keeps the root above zero."""
+    """Added to the variance to avoid division by zero."""
     clip: float
-    """Largest value after scaling."""
+    """Largest absolute value after scaling."""
 
 
 @dataclass(frozen=True)
 class Success:
-    """A measurement of the policy."""
+    """Measured success of the policy."""
 
     episodes: int
-    """How many were played."""
+    """Number of episodes."""
     rate: float
-    """Share of them that ended in success."""
+    """Fraction of the episodes that ended in success."""
     fidelity: str | None
-    """Preset at which they were played; None for the environment's own."""
+    """Fidelity preset of the episodes; None for the default of the environment."""
     seed: int
-    """Of the first episode."""
+    """Seed of the first episode."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a policy file says of itself."""
+    """Description of a policy."""
 
     algorithm: str
     """ppo or sac."""
     environment: Environment
-    """What it was trained on."""
+    """The environment of training."""
     observation: dict[str, tuple[int, ...]]
-    """Shape of one world's observation by key, in the order in which the network takes them."""
+    """Shape of one world's observation by key, in the order of the network's inputs."""
     network: Network
-    """How it acts."""
+    """The network from observations to actions."""
     normalization: Normalization | None
-    """How observations are scaled before; None if they are not."""
+    """Scaling of observations; None without normalisation."""
     success: Success | None
-    """How well it does, if that was measured."""
+    """Measured success; None if not measured."""
     seed: int | None
     """Seed of training."""
     steps: int
     """Environment steps of training, summed over worlds."""
     commit: str | None
-    """Git commit of the source that trained it, if known."""
+    """Git commit of the training code, if known."""
     versions: dict[str, Any]
-    """Python, platform and packages that trained it."""
+    """Versions of Python, platform and packages in training."""
 
 
 def read_header(text: bytes) -> Header:
-    """Reads and checks a header.
+    """Reads and validates a header.
 
     Args:
         text: JSON in UTF-8.
 
     Raises:
-        Misfit: It is no JSON, or a field is missing, unknown, of a wrong type or contradicts
-            another.
+        InvalidHeader: The text is not JSON, or a field is missing, unknown, of a wrong type or in
+            contradiction to another one.
     """
     try:
-        values = json.loads(text.decode("utf-8"), parse_constant=_refuse_constant)
+        values = json.loads(text.decode("utf-8"), parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
-        raise Misfit(f"the header is not JSON: {error}") from None
+        raise InvalidHeader(f"the header is not JSON: {error}") from None
     fields = _fields(values, "the header", Header)
     algorithm = _one_of(fields["algorithm"], "algorithm", tuple(SQUASHING))
     observation = {
@@ -129,7 +129,9 @@ def read_header(text: bytes) -> Header:
     )
     inputs = sum(math.prod(shape) for shape in observation.values())
     if header.network.widths[0] != inputs:
-        raise Misfit(f"network.widths begins with {header.network.widths[0]}, should be {inputs}")
+        raise InvalidHeader(
+            f"network.widths starts with {header.network.widths[0]}, should be {inputs}"
+        )
     if header.normalization is not None:
         for key in header.normalization.keys:
             _one_of(key, "normalization.keys", tuple(observation))
@@ -144,7 +146,9 @@ def _environment(value: Any) -> Environment:
         _mapping(fields["kwargs"], "environment.kwargs"),
     )
     if not found.id.endswith(f"-v{found.version}"):
-        raise Misfit(f"environment.version is {found.version}, but environment.id is {found.id!r}")
+        raise InvalidHeader(
+            f"environment.version is {found.version}, but environment.id is {found.id!r}"
+        )
     return found
 
 
@@ -158,14 +162,16 @@ def _network(value: Any, algorithm: str) -> Network:
         [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
     )
     if len(network.widths) < 2 or min(network.widths) < 1:
-        raise Misfit(f"network.widths is {network.widths}, should be two or more, each at least 1")
+        raise InvalidHeader(
+            f"network.widths is {network.widths}, should be two or more integers of at least 1"
+        )
     for name, bounds in (("low", network.low), ("high", network.high)):
         if len(bounds) != network.widths[-1]:
-            raise Misfit(
+            raise InvalidHeader(
                 f"network.{name} has {len(bounds)} entries, should have {network.widths[-1]}"
             )
     if any(low > high for low, high in zip(network.low, network.high, strict=True)):
-        raise Misfit(f"network.low is {network.low}, should be at most high, {network.high}")
+        raise InvalidHeader(f"network.low is {network.low}, should be at most high, {network.high}")
     return network
 
 
@@ -173,10 +179,12 @@ def _normalization(value: Any) -> Normalization:
     fields = _fields(value, "normalization", Normalization)
     keys = [_text(x, "normalization.keys") for x in _list(fields["keys"], "normalization.keys")]
     if len(set(keys)) != len(keys):
-        raise Misfit(f"normalization.keys is {keys}, should name each once")
+        raise InvalidHeader(f"normalization.keys is {keys}, should not repeat a key")
     epsilon, clip = (_number(fields[x], f"normalization.{x}") for x in ("epsilon", "clip"))
     if epsilon <= 0 or clip <= 0:
-        raise Misfit(f"normalization has epsilon {epsilon} and clip {clip}, should be above 0")
+        raise InvalidHeader(
+            f"normalization has epsilon {epsilon} and clip {clip}, should be above 0"
+        )
     return Normalization(keys, epsilon, clip)
 
 
@@ -184,7 +192,7 @@ def _success(value: Any) -> Success:
     fields = _fields(value, "success", Success)
     rate = _number(fields["rate"], "success.rate")
     if not 0 <= rate <= 1:
-        raise Misfit(f"success.rate is {rate}, should be from 0 to 1")
+        raise InvalidHeader(f"success.rate is {rate}, should be from 0 to 1")
     return Success(
         _integer(fields["episodes"], "success.episodes"),
         rate,
@@ -197,20 +205,22 @@ def _fields(value: Any, name: str, kind: Any) -> dict[str, Any]:
     """A mapping with exactly the fields of a dataclass."""
     mapping, expected = _mapping(value, name), list(kind.__dataclass_fields__)
     if set(mapping) != set(expected):
-        odd = ", ".join(sorted(set(mapping) ^ set(expected)))
-        raise Misfit(f"{name} should have the fields {', '.join(expected)}; at odds: {odd}")
+        differing = ", ".join(sorted(set(mapping) ^ set(expected)))
+        raise InvalidHeader(
+            f"{name} should have the fields {', '.join(expected)}; missing or unknown: {differing}"
+        )
     return mapping
 
 
 def _mapping(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise Misfit(f"{name} is {value!r:.80}, should be a mapping")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be a mapping")
     return value
 
 
 def _list(value: Any, name: str) -> list[Any]:
     if not isinstance(value, list):
-        raise Misfit(f"{name} is {value!r:.80}, should be a list")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be a list")
     return value
 
 
@@ -220,25 +230,25 @@ def _integers(value: Any, name: str) -> list[int]:
 
 def _integer(value: Any, name: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**63:
-        raise Misfit(f"{name} is {value!r:.80}, should be an integer of at least 0")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be an integer of at least 0")
     return value
 
 
 def _number(value: Any, name: str) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool) or abs(value) > 1e300:
-        raise Misfit(f"{name} is {value!r:.80}, should be a finite number")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be a finite number")
     return float(value)
 
 
 def _text(value: Any, name: str) -> str:
     if not isinstance(value, str):
-        raise Misfit(f"{name} is {value!r:.80}, should be text")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be text")
     return value
 
 
 def _one_of(value: Any, name: str, known: tuple[str, ...]) -> str:
     if value not in known:
-        raise Misfit(f"{name} is {value!r:.80}, should be {' or '.join(known)}")
+        raise InvalidHeader(f"{name} is {value!r:.80}, should be {' or '.join(known)}")
     return str(value)
 
 
@@ -246,5 +256,5 @@ def _optional(value: Any, read: Callable[[Any], Any]) -> Any:
     return None if value is None else read(value)
 
 
-def _refuse_constant(name: str) -> None:
-    raise Misfit(f"the header holds {name}, should hold finite numbers")
+def _reject_constant(name: str) -> None:
+    raise InvalidHeader(f"the header has the number {name}, should have finite numbers")

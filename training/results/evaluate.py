@@ -1,8 +1,8 @@
-"""How often a policy succeeds, with the interval that the number of episodes allows.
+"""Measures the success rate of a policy, with a confidence interval.
 
-Episode i is the one that the single environment plays after `reset(seed=seed + i)`: each world
-plays exactly one episode a round and then is ignored, so that short episodes count no more than
-long ones and the result does not depend on the number of worlds.
+Episode i is the episode of the single environment after `reset(seed=seed + i)`. Each world plays
+one episode per round and is then ignored until the next round. So short episodes do not count more
+than long ones, and the outcome does not depend on the number of worlds.
 """
 
 import math
@@ -19,11 +19,15 @@ from rich.progress import Progress
 from rich.table import Table
 
 from training.policies.policy import Policy
-from training.settings.environments import make_vector_env
+from training.settings.environments import (
+    effective_fidelity,
+    make_vector_env,
+    registered_arguments,
+)
 from training.settings.errors import UsageError
 
 FIRST_SEED = 1_000_000
-"""Far from the seeds that training uses, which count up from a small number."""
+"""Far from the seeds of training, which count up from a small number."""
 WORLDS = 1024
 NORMAL_QUANTILE = 1.959963984540054
 """Two-sided 95 %."""
@@ -31,18 +35,24 @@ NORMAL_QUANTILE = 1.959963984540054
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The outcome of each episode, in the order of their seeds."""
+    """The outcome of each episode in the order of the seeds, and how they were played."""
 
     success_at_end: np.ndarray
-    """(episodes,) bool: the goal was met when the episode ended."""
+    """(episodes,) bool: the goal was reached at the end of the episode."""
     success_at_any_time: np.ndarray
-    """(episodes,) bool: the goal was met after some step."""
+    """(episodes,) bool: the goal was reached after at least one step."""
     episode_return: np.ndarray
-    """(episodes,) sum of rewards."""
+    """(episodes,) sum of the rewards."""
     length: np.ndarray
     """(episodes,) steps."""
     seconds: float
     """Wall time, in seconds."""
+    first_seed: int
+    """Seed of the first episode; the following ones count up."""
+    fidelity: Any
+    """Fidelity of the physics; None for an environment without it."""
+    env_kwargs: dict[str, Any]
+    """Arguments of the environment, including those that its id sets."""
 
 
 def evaluate(
@@ -53,24 +63,25 @@ def evaluate(
     quiet: bool = False,
     **env_kwargs: Any,
 ) -> Evaluation:
-    """Plays the episodes with seeds seed, seed + 1, ...
+    """Plays the episodes with the seeds seed, seed + 1, ...
 
     Args:
-        policy: What acts.
-        episodes: How many.
-        seed: Seed of the first.
+        policy: The policy.
+        episodes: Number of episodes.
+        seed: Seed of the first episode.
         quiet: Show no progress.
-        env_kwargs: Arguments of the environment, over those that the policy was trained with.
+        env_kwargs: Arguments of the environment that replace those of training.
 
     Raises:
-        UsageError: A number is out of range or the environment refuses its arguments.
+        UsageError: A number is out of range, or the environment rejects its arguments.
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
     if seed < 0:
         raise UsageError(f"seed is {seed}, should be at least 0")
     worlds = min(episodes, WORLDS)
-    envs = make_vector_env(policy.env_id, worlds, **{**policy.env_kwargs, **env_kwargs})
+    arguments = {**policy.env_kwargs, **env_kwargs}
+    envs = make_vector_env(policy.env_id, worlds, **arguments)
     start = time.perf_counter()
     rounds = []
     console = Console(quiet=quiet or not sys.stdout.isatty())
@@ -83,18 +94,26 @@ def evaluate(
                 )
         finally:
             envs.close()
-    # The last round may play more than asked; its worlds are in the order of their seeds.
+    # the last round may play more episodes than needed; worlds are in the order of their seeds
     at_end, at_any_time, episode_return, length = (
         np.concatenate(parts)[:episodes] for parts in zip(*rounds, strict=True)
     )
-    seconds = time.perf_counter() - start
-    return Evaluation(at_end, at_any_time, episode_return, length, seconds)
+    return Evaluation(
+        success_at_end=at_end,
+        success_at_any_time=at_any_time,
+        episode_return=episode_return,
+        length=length,
+        seconds=time.perf_counter() - start,
+        first_seed=seed,
+        fidelity=effective_fidelity(policy.env_id, arguments),
+        env_kwargs={**registered_arguments(policy.env_id), **arguments},
+    )
 
 
 def _play_round(
     envs: VectorEnv, policy: Policy, seed: int, advance: Callable[[int], None]
 ) -> tuple[np.ndarray, ...]:
-    """One episode in each world: the first four fields of Evaluation."""
+    """Plays one episode in each world; returns the first four fields of Evaluation."""
     success_at_end = np.zeros(envs.num_envs, dtype=bool)
     success_at_any_time = np.zeros(envs.num_envs, dtype=bool)
     episode_return = np.zeros(envs.num_envs)
@@ -106,7 +125,7 @@ def _play_round(
         observation, rewards, terminated, truncated, infos = envs.step(actions)
         ended = playing & (terminated | truncated)
         success = np.array(infos["is_success"], dtype=bool)
-        if ended.any():  # their own is_success is of the new episode already
+        if ended.any():  # infos["is_success"] already belongs to their next episode
             success[ended] = infos["final_info"]["is_success"][ended]
         episode_return[playing] += rewards[playing]
         length[playing] += 1
@@ -118,19 +137,29 @@ def _play_round(
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
-    """The 95 % interval of a success probability (Wilson 1927); honest at 0 and 100 % too."""
+    """The 95 % confidence interval of a probability (Wilson 1927), valid at 0 and 100 % too."""
     z2 = NORMAL_QUANTILE**2
-    share = successes / trials
-    centre = (share + z2 / (2 * trials)) / (1 + z2 / trials)
-    spread = math.sqrt(share * (1 - share) / trials + z2 / (4 * trials**2))
-    half_width = NORMAL_QUANTILE / (1 + z2 / trials) * spread
+    rate = successes / trials
+    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    deviation = math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    half_width = NORMAL_QUANTILE / (1 + z2 / trials) * deviation
     return max(0.0, centre - half_width), min(1.0, centre + half_width)
 
 
 def print_evaluation(policy: Policy, result: Evaluation) -> None:
-    """Prints the table of an evaluation."""
-    table = Table(title=f"{policy.env_id}, {policy.name}")
-    table.add_column(f"{len(result.length):,} episodes in {result.seconds:.1f} s")
+    """Prints how the episodes were played, and the table of the outcome."""
+    episodes = len(result.length)
+    arguments = {key: value for key, value in result.env_kwargs.items() if key != "fidelity"}
+    for name, value in (
+        ("environment", policy.env_id),
+        ("policy", policy.name),
+        ("fidelity", result.fidelity),
+        ("arguments", ", ".join(f"{k}: {v}" for k, v in arguments.items()) or "defaults"),
+        ("seeds", f"{result.first_seed} to {result.first_seed + episodes - 1}"),
+    ):
+        print(f"{name:<12} {value}")
+    table = Table()
+    table.add_column(f"{episodes:,} episodes in {result.seconds:.1f} s")
     table.add_column("value", justify="right")
     table.add_column("95 % interval", justify="right")
     for name, outcome in (

@@ -1,4 +1,4 @@
-"""Films as GIFs, small enough to stand in a page: half the pictures, few colours, a small size."""
+"""GIFs that are small enough for a page: half the frames, few colours, a small size."""
 
 from pathlib import Path
 from types import TracebackType
@@ -8,56 +8,56 @@ import numpy as np
 from PIL import Image
 
 WIDTH = 320
-"""Pixels: a film of three episodes then takes 50 to 320 KB, the most for Stack's long ones."""
+"""Pixels. Three episodes then take 50 to 320 KB; the long episodes of Stack take most."""
 COLOURS = 64
-"""Shades of a few solids on a plain ground; more double the size and hardly show."""
+"""Enough for a few bodies on a plain ground; more colours double the size, hardly visibly."""
 SKIP = 2
-"""One picture of so many is kept, and shown as much longer."""
+"""Only each n-th frame is stored, and shown n times as long."""
 PALETTE_SAMPLES = 16
-"""Pictures from all over the film that its colours are chosen from."""
+"""Number of frames, evenly over the video, from which the palette is chosen."""
 
 
 class GifWriter:
-    """Takes the pictures of a film one by one, and writes the file when it is closed.
+    """Takes frames one by one and writes the file when it is closed.
 
-    All pictures share one palette without dithering: what stands still then stays the same to the
-    bit, and the format stores only the rectangle that has changed.
+    All frames have the same palette, without dithering. Then pixels that do not move stay equal,
+    and the format stores only the rectangle that has changed.
 
     Args:
         path: The file.
-        fps: Pictures a second, of those that are given.
-        width: Of the film, in pixels; larger pictures are shrunk to it, smaller ones kept.
+        fps: Frames per second of the frames that are passed.
+        width: Width in pixels; larger frames are scaled down, smaller ones are not changed.
     """
 
     def __init__(self, path: Path, fps: float, width: int = WIDTH):
         self.path = path
         self.fps = fps
         self.width = width
-        self.given = 0
-        self.kept: list[Image.Image] = []
+        self.received = 0
+        self.frames: list[Image.Image] = []
 
     def append_data(self, frame: np.ndarray) -> None:
-        """Adds a picture, (height, width, 3) uint8."""
-        if self.given % SKIP == 0:
-            picture = Image.fromarray(frame)
-            if picture.width > self.width:
-                height = round(self.width * picture.height / picture.width)
-                picture = picture.resize((self.width, height), Image.Resampling.LANCZOS)
-            self.kept.append(picture)
-        self.given += 1
+        """Adds a frame, (height, width, 3) uint8."""
+        if self.received % SKIP == 0:
+            image = Image.fromarray(frame)
+            if image.width > self.width:
+                height = round(self.width * image.height / image.width)
+                image = image.resize((self.width, height), Image.Resampling.LANCZOS)
+            self.frames.append(image)
+        self.received += 1
 
     def close(self) -> None:
-        """Writes the file, which plays for ever; nothing if no picture was given."""
-        if not self.kept:
+        """Writes the file, which repeats forever; writes nothing if there is no frame."""
+        if not self.frames:
             return
-        every = max(1, len(self.kept) // PALETTE_SAMPLES)
-        sample = np.concatenate([np.asarray(picture) for picture in self.kept[::every]])
-        # an octree, for a median cut spends all colours on the ground's shades, and none on a ball
+        every = max(1, len(self.frames) // PALETTE_SAMPLES)
+        sample = np.concatenate([np.asarray(frame) for frame in self.frames[::every]])
+        # octree: a median cut uses all colours for shades of the ground, and none for a small ball
         palette = Image.fromarray(sample).quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
         first, *others = [
-            picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in self.kept
+            frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in self.frames
         ]
-        # the format counts in hundredths of a second, and viewers slow down what is below two
+        # the unit of the format is 10 ms, and viewers slow down frames shorter than 20 ms
         duration = max(20, 10 * round(100 * SKIP / self.fps))
         first.save(
             self.path,

@@ -1,4 +1,4 @@
-"""Learning curves as a picture: of one run, or of several that differ by their seed."""
+"""Plots learning curves: of one run, or of several that differ only in their seed."""
 
 import csv
 from collections.abc import Collection, Sequence
@@ -16,61 +16,62 @@ STEPS = "time/total_timesteps"
 SECONDS = "time/wall_time"
 SUCCESS = "rollout/success_rate"
 POINTS = 200
-"""At which the curves of several runs are compared: more than the picture can show."""
+"""Number of points at which several curves are averaged: more than the plot can resolve."""
 
 Curve = list[dict[str, float]]
-"""Rows of a learning curve: steps, seconds and success by the names of their columns."""
+"""Rows of a learning curve: steps, seconds and success rate by column name."""
 
 
-def plot_learning_curves(folders: Sequence[RunFolder], picture: Path | None = None) -> Path:
-    """Draws the success rate against wall time and against steps.
+def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None) -> Path:
+    """Plots the success rate against wall time and against steps.
 
     Args:
-        folders: One or more runs, of the same algorithm on the same task.
-        picture: The PNG to write; if not given, learning_curve.png in the folder of a single run,
-            <environment>_learning_curves.png beside the folders of several.
+        folders: One or more runs of the same algorithm on the same task.
+        image: The PNG to write; by default learning_curve.png in the folder of a single run, or
+            <environment>_learning_curves.png next to the folders of several.
 
     Returns:
-        The path of the picture.
+        The path of the PNG.
 
     Raises:
-        UsageError: A run has no learning curve yet, is given twice, or is one of another kind.
+        UsageError: A run has no learning curve yet or is given twice, or the runs differ in more
+            than their seed.
     """
     curves = [read_learning_curve(folder) for folder in folders]
     configs = [folder.config() for folder in folders]
-    _check_same_kind(folders)
+    _check_comparable(folders)
     first = configs[0]
-    if picture is None and len(folders) == 1:
-        picture = folders[0].path / "learning_curve.png"
-    elif picture is None:
-        picture = folders[0].path.parent / f"{folder_name(first.env_id)}_learning_curves.png"
+    if image is None and len(folders) == 1:
+        image = folders[0].path / "learning_curve.png"
+    elif image is None:
+        image = folders[0].path.parent / f"{folder_name(first.env_id)}_learning_curves.png"
     seeds = ", ".join(str(config.seed) for config in configs)
     draw_learning_curves(
         curves,
-        picture,
+        image,
         title=f"{first.env_id}, {first.algo}, seed{'s' if len(configs) > 1 else ''} {seeds}",
         labels=[f"seed {config.seed}" for config in configs],
         targets={config.target_success_rate for config in configs} - {None},  # type: ignore[arg-type]
     )
-    return picture
+    return image
 
 
 def draw_learning_curves(
     curves: Sequence[Curve],
-    picture: Path,
+    image: Path,
     *,
     title: str,
     labels: Sequence[str],
     targets: Collection[float] = (),
 ) -> None:
-    """Draws one curve thick, or several thin with their mean and the band from lowest to highest.
+    """Plots one curve, or several thin curves with their mean and a band from minimum to maximum.
 
     Args:
         curves: The curves, each with at least one row.
-        picture: The PNG to write.
-        title: What stands above.
+        image: The PNG to write.
+        title: Title of the plot.
         labels: A name for each curve.
-        targets: Success rates at which training ends, dotted.
+        targets: Success rates at which training ends, shown as dotted lines.
     """
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     FigureCanvasAgg(figure)
@@ -93,30 +94,30 @@ def draw_learning_curves(
     if len(curves) > 1:
         right.legend(loc="lower right", fontsize="small")
     figure.suptitle(title)
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(picture, dpi=120)
+    image.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(image, dpi=120)
 
 
 def mean_and_spread(
     lines: Sequence[tuple[Sequence[float] | np.ndarray, Sequence[float]]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Mean, lowest and highest of several lines where all of them have values.
+    """Mean, minimum and maximum of several lines over the range that all of them cover.
 
-    Beyond the end of the shortest nothing is assumed of it: a run that has reached its target and
-    one that was given fewer steps end alike.
+    The range ends with the shortest line: a run that stopped at its target cannot be distinguished
+    from one with fewer steps.
 
     Args:
-        lines: Places in rising order and values, of each line.
+        lines: For each line, the x values in ascending order and the y values.
 
     Returns:
-        Places, means, lowest and highest values `(points,)`; None if the lines share no stretch.
+        x values, means, minima and maxima `(points,)`; None if the lines have no common range.
     """
     start, end = max(x[0] for x, _ in lines), min(x[-1] for x, _ in lines)
     if start >= end:
         return None
-    places = np.linspace(start, end, POINTS)
-    values = np.array([np.interp(places, x, y) for x, y in lines])
-    return places, values.mean(axis=0), values.min(axis=0), values.max(axis=0)
+    points = np.linspace(start, end, POINTS)
+    values = np.array([np.interp(points, x, y) for x, y in lines])
+    return points, values.mean(axis=0), values.min(axis=0), values.max(axis=0)
 
 
 def _draw_spread(
@@ -126,22 +127,23 @@ def _draw_spread(
         axes.plot(*line, linewidth=0.7, alpha=0.8, label=label)
     shared = mean_and_spread(lines)
     if shared is not None:
-        places, mean, lowest, highest = shared
-        axes.fill_between(places, lowest, highest, color="black", alpha=0.12, linewidth=0)
-        axes.plot(places, mean, color="black", linewidth=2, label="mean")
+        points, mean, lowest, highest = shared
+        axes.fill_between(points, lowest, highest, color="black", alpha=0.12, linewidth=0)
+        axes.plot(points, mean, color="black", linewidth=2, label="mean")
 
 
 def read_learning_curve(folder: RunFolder) -> Curve:
-    """The rows of progress.csv that know a success rate: steps, seconds and success.
+    """The rows of progress.csv that have a success rate: steps, seconds and success rate.
 
     Raises:
-        UsageError: There are none.
+        UsageError: The folder holds no run, or progress.csv is missing, damaged or has no such row.
     """
+    folder.check_exists()
     return read_curve(folder.progress)
 
 
 def read_curve(progress: Path) -> Curve:
-    """The same of a file; arguments and errors as of `read_learning_curve`."""
+    """The rows of a file that have a success rate; errors as for `read_learning_curve`."""
     columns = (STEPS, SECONDS, SUCCESS)
     try:
         with progress.open(encoding="utf-8", newline="") as file:
@@ -152,7 +154,7 @@ def read_curve(progress: Path) -> Curve:
             ]
     except FileNotFoundError:
         raise UsageError(
-            f"{progress.parent} holds no learning curve: {progress.name} is missing"
+            f"{progress.parent} has no learning curve: {progress.name} is missing"
         ) from None
     except (ValueError, OSError, csv.Error) as error:
         raise UsageError(f"{progress} is damaged: {error}") from None
@@ -161,13 +163,13 @@ def read_curve(progress: Path) -> Curve:
     return rows
 
 
-def _check_same_kind(folders: Sequence[RunFolder]) -> None:
-    """Raises UsageError unless the runs can be seeds of one experiment."""
+def _check_comparable(folders: Sequence[RunFolder]) -> None:
+    """Raises UsageError if the runs differ in more than their seed."""
     seen: set[Path] = set()
     first = folders[0].config()
     for folder in folders:
         if folder.path.resolve() in seen:
-            raise UsageError(f"{folder.path} is given twice; each run should be given once")
+            raise UsageError(f"{folder.path} is given twice, should be given once")
         seen.add(folder.path.resolve())
         config = folder.config()
         for name, own, expected in (
@@ -178,5 +180,5 @@ def _check_same_kind(folders: Sequence[RunFolder]) -> None:
             if own != expected:
                 raise UsageError(
                     f"{name} of {folder.path} is {own!r}, but {folders[0].path} has {expected!r}: "
-                    "runs that are drawn together should differ by their seed only"
+                    "runs in one plot should differ only in their seed"
                 )

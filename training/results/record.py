@@ -1,4 +1,4 @@
-"""Films a policy: an mp4 or a GIF and a still, with no display."""
+"""Records a video of a policy: an mp4 or a GIF, and a still image. Needs no display."""
 
 import os
 import sys
@@ -31,22 +31,22 @@ def record(
     gif_width: int = WIDTH,
     **env_kwargs: Any,
 ) -> tuple[Path, Path]:
-    """Plays the episodes with seeds seed, seed + 1, ... on the single environment and films them.
+    """Records the episodes with the seeds seed, seed + 1, ... of the single environment.
 
     Args:
-        policy: What acts.
-        video: The mp4 or GIF to write; the still takes the same name with .png.
-        episodes: How many.
-        seed: Seed of the first.
+        policy: The policy.
+        video: The mp4 or GIF to write; the still image has the same name with .png.
+        episodes: Number of episodes.
+        seed: Seed of the first episode.
         quiet: Show no progress.
-        gif_width: Of a GIF, in pixels; an mp4 has the size of the pictures.
-        env_kwargs: Arguments of the environment, over those that the policy was trained with.
+        gif_width: Width of a GIF in pixels; an mp4 has the size of the frames.
+        env_kwargs: Arguments of the environment that replace those of training.
 
     Returns:
-        The paths of the video and of the still, which shows the middle of the first episode.
+        The paths of the video and of the still image, which shows the middle of the first episode.
 
     Raises:
-        UsageError: A number or the name is wrong, or the environment refuses its arguments.
+        UsageError: A number or the file name is invalid, or the environment rejects its arguments.
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
@@ -60,8 +60,8 @@ def record(
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())
     with _writer(video, fps, gif_width) as writer, closing(env):
-        for episode in track(range(episodes), "filming", transient=True, console=console):
-            frames = _film_episode(env, policy, seed + episode)
+        for episode in track(range(episodes), "recording", transient=True, console=console):
+            frames = _render_episode(env, policy, seed + episode)
             if episode == 0:
                 imageio.imwrite(still, frames[len(frames) // 2])
             for frame in frames:
@@ -72,11 +72,11 @@ def record(
 def _writer(video: Path, fps: float, gif_width: int) -> Any:
     if video.suffix == ".gif":
         return GifWriter(video, fps, gif_width)
-    # The codec wants even sides: blocks of 2 keep the picture's size, blocks of 16 stretch it.
+    # the codec requires even sizes: blocks of 2 keep the size of the frames, the default scales it
     return imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
 
 
-def _film_episode(env: Any, policy: Policy, seed: int) -> list[np.ndarray]:
+def _render_episode(env: Any, policy: Policy, seed: int) -> list[np.ndarray]:
     observation, _ = env.reset(seed=seed)
     frames = [env.render()]
     ended = False

@@ -1,4 +1,4 @@
-"""Makes a result of a finished run: evaluates its policy and keeps what is small."""
+"""Records the result of a finished run: evaluates its policy and copies the small files."""
 
 import csv
 import json
@@ -16,15 +16,16 @@ from training.results.plot import read_learning_curve
 from training.results.result import RESULT, Result, parse_result, read_results, task_name
 from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
-from training.settings.config import PACKAGED, TrainConfig, load_config
+from training.settings.config import TrainConfig
+from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 
-LARGEST = 300_000
-"""Bytes of a policy or a picture: a repository keeps them for ever."""
+MAX_FILE_BYTES = 300_000
+"""Largest policy or image, because a git repository stores every version of it."""
 ROWS = 200
-"""Of a learning curve: more than a picture of it can show."""
+"""Largest number of rows of a learning curve: more than a plot can resolve."""
 COLUMNS = ("rollout/", "time/")
-"""Beginnings of the columns that are kept of it."""
+"""Prefixes of the columns of a learning curve that are copied."""
 
 
 def record_run(
@@ -35,17 +36,17 @@ def record_run(
     replace: bool = False,
     quiet: bool = False,
 ) -> Result:
-    """Evaluates the policy of a finished run and writes a result, whole or not at all.
+    """Evaluates the policy of a finished run and writes its result atomically.
 
     Args:
         folder: The run.
-        repository: Where the folder of results is.
-        episodes: How many to evaluate on.
-        replace: Whether a result of the same kind and seed gives way.
+        repository: Folder that contains the folder of results.
+        episodes: Number of episodes of the evaluation.
+        replace: Whether to replace a result of the same kind and seed.
         quiet: Show no progress.
 
     Raises:
-        UsageError: The run is not finished or damaged, it or another of its seed is recorded
+        UsageError: The run is not finished or damaged, it or another run with its seed is recorded
             already, its policy is too large, or the files cannot be written.
     """
     config = folder.config()
@@ -56,25 +57,25 @@ def record_run(
         )
     _check_place(folder, config, run, repository, replace)
     read_learning_curve(folder)
-    if folder.policy.exists() and folder.policy.stat().st_size > LARGEST:
+    if folder.policy.exists() and folder.policy.stat().st_size > MAX_FILE_BYTES:
         size = folder.policy.stat().st_size
-        raise UsageError(f"its policy takes {size:,} bytes, should be at most {LARGEST:,}")
+        raise UsageError(f"its policy has {size:,} bytes, should have at most {MAX_FILE_BYTES:,}")
     policy = trained_policy(folder.path)
     outcome = evaluate(policy, episodes, seed=FIRST_SEED, quiet=quiet)
     seconds, resumed = float(state["seconds"]), run.get("resumed", [])
     values = {
         "algorithm": config.algo,
         "env_id": config.env_id,
-        "arguments": config.last_env_kwargs,
+        "arguments": config.final_env_kwargs,
         "seed": config.seed,
         "steps": state.get("steps"),
         "seconds": round(seconds, 3),
-        "environment_share": round(float(state["seconds_in_envs"]) / seconds, 4),
+        "environment_time_fraction": round(float(state["seconds_in_envs"]) / seconds, 4),
         "episodes": episodes,
         "first_seed": FIRST_SEED,
-        "fidelity": config.last_env_kwargs.get("fidelity"),
-        "success_at_end": _share(outcome.success_at_end),
-        "success_at_any_time": _share(outcome.success_at_any_time),
+        "fidelity": config.final_env_kwargs.get("fidelity"),
+        "success_at_end": _rate(outcome.success_at_end),
+        "success_at_any_time": _rate(outcome.success_at_any_time),
         "command": _command(config) + _threads(run),
         "commit": run.get("git_commit"),
         "resumed": len(resumed) if isinstance(resumed, list) else resumed,
@@ -90,9 +91,9 @@ def record_run(
 
 
 def _finished(folder: RunFolder) -> dict[str, Any]:
-    """The state at the end of a run."""
+    """The last checkpoint's state of a finished run."""
     if not folder.checkpoints():
-        raise UsageError("it has no checkpoint yet")
+        raise UsageError("the run has no checkpoint yet")
     try:
         state = read_state(folder.checkpoint)
         finished, in_envs = state["finished"], state.get("seconds_in_envs")
@@ -101,14 +102,16 @@ def _finished(folder: RunFolder) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(f"{folder.checkpoint.name}/state.json is damaged: {error}") from None
     if finished is not True:
-        raise UsageError(f"it is not finished: rigid-envs train --resume {folder.path}")
+        raise UsageError(
+            f"the run is not finished; to finish it: rigid-envs train --resume {folder.path}"
+        )
     if in_envs is None:
-        raise UsageError("how much of its time the environments took is not known: train anew")
+        raise UsageError("the run did not record the time spent in the environments; train again")
     return dict(state)
 
 
 def _descriptions(folder: RunFolder) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What run.json and versions.json say."""
+    """Content of run.json and versions.json."""
     found = []
     for name in ("run.json", "versions.json"):
         try:
@@ -123,8 +126,8 @@ def _descriptions(folder: RunFolder) -> tuple[dict[str, Any], dict[str, Any]]:
 def _check_place(
     folder: RunFolder, config: TrainConfig, run: dict[str, Any], repository: Path, replace: bool
 ) -> None:
-    """Raises UsageError where a result would take another's place or stand in the wrong table."""
-    task = task_name(config.env_id, config.last_env_kwargs)
+    """Raises UsageError if the result would replace another one, or does not fit its table."""
+    task = task_name(config.env_id, config.final_env_kwargs)
     for other in read_results(repository):
         if (other.algorithm, other.task) != (config.algo, task):
             continue
@@ -133,52 +136,55 @@ def _check_place(
         if again and replace:
             continue
         same = again and other.started == run.get("started")
-        if same and other.arguments == config.last_env_kwargs:
-            raise UsageError(f"it is recorded already, in {place}")
-        settings = load_config(config.algo, config.env_id, other.folder(repository) / "config.yaml")
+        if same and other.arguments == config.final_env_kwargs:
+            raise UsageError(f"the run is recorded already, in {place}")
+        settings = load_config(
+            other.algorithm, other.env_id, other.folder(repository) / "config.yaml"
+        )
         for name, value in settings.replace(seed=config.seed).as_mapping().items():
             if (own := config.as_mapping()[name]) != value:
                 raise UsageError(
-                    f"its {name} is {own}, but {place}, of the same table, has {value}; runs of a "
-                    "table differ by their seed alone; delete its folders to begin it anew"
+                    f"its {name} is {own}, but {place}, in the same table, has {value}; runs in a "
+                    "table should differ only in their seed; to start the table again, delete its "
+                    "folders in results/"
                 )
         if again:
             raise UsageError(
-                f"{place} holds another run of its seed; to put this in its place: "
+                f"{place} is another run with the same seed; to replace it: "
                 f"rigid-envs results --replace {folder.path}"
             )
 
 
-def _share(outcome: np.ndarray) -> dict[str, float]:
+def _rate(outcome: np.ndarray) -> dict[str, float]:
     low, high = wilson_interval(int(outcome.sum()), len(outcome))
     rate = float(outcome.mean())
-    # where all or none succeed, rounding puts the interval's end beside the rate
+    # at 0 and 100 %, rounding can put the rate outside the interval
     return {"low": min(low, rate), "rate": rate, "high": max(high, rate)}
 
 
 def _command(config: TrainConfig) -> str:
-    """The shortest command that trains the same again, in the repository's folder."""
+    """The shortest command that repeats the training, in the repository's folder."""
     words = f"rigid-envs train --algo {config.algo} --env {config.env_id}"
     try:
-        packaged = load_config(config.algo, config.env_id, PACKAGED / f"{config.algo}.yaml")
+        packaged = load_config(config.algo, config.env_id)
         if packaged.replace(seed=config.seed) == config:
             return f"{words} --seed {config.seed}"
         if packaged.replace(seed=config.seed, n_timesteps=config.n_timesteps) == config:
             return f"{words} --seed {config.seed} -n {config.n_timesteps}"
-    except UsageError:  # no settings come with us for it
+    except UsageError:  # there are no packaged settings for it
         pass
-    task = task_name(config.env_id, config.last_env_kwargs)
+    task = task_name(config.env_id, config.final_env_kwargs)
     return f"{words} --config results/{config.algo}/{task}_seed{config.seed}/config.yaml"
 
 
 def _threads(run: dict[str, Any]) -> str:
-    """The threads of torch that a run was told: with others its sums, and so its policy, differ."""
-    words = run.get("command")
-    told = [str(word) for word in words] if isinstance(words, list) else []
-    for word, after in zip(told, [*told[1:], ""], strict=True):
+    """The option --num-threads of a run: rounding, and so the policy, depends on it."""
+    command = run.get("command")
+    words = [str(word) for word in command] if isinstance(command, list) else []
+    for word, following in zip(words, [*words[1:], ""], strict=True):
         name, _, value = word.partition("=")
         if name == "--num-threads":
-            return f" --num-threads {value or after}"
+            return f" --num-threads {value or following}"
     return ""
 
 
@@ -201,7 +207,7 @@ def _write(result: Result, folder: RunFolder, config: TrainConfig, repository: P
 
 
 def _thin(source: Path, target: Path) -> None:
-    """Copies a learning curve with at most ROWS rows, the first and the last among them."""
+    """Copies a learning curve with at most ROWS rows, including the first and the last."""
     with source.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     columns = [name for name in rows[0] if name.startswith(COLUMNS)]

@@ -1,10 +1,10 @@
-"""What a recorded run says of itself: one small file, from which all tables are made.
+"""The result of a training run: one small file, from which all tables are generated.
 
 results/<algo>/<environment>_seed<seed>/
-result.json      this, see Result
-config.yaml      the settings, readable by `rigid-envs train --config`
-progress.csv     the learning curve, thinned
-policy.policy    what acts
+    result.json      the result, see Result
+    config.yaml      the settings, readable by `rigid-envs train --config`
+    progress.csv     the learning curve, with fewer rows
+    policy.policy    the policy
 """
 
 import dataclasses
@@ -18,112 +18,123 @@ import gymnasium as gym
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.runs.run_folder import folder_name
+from training.settings.environment_ids import plain_id
 from training.settings.errors import UsageError, nearest
-from training.settings.settings import Unfit, choice, integer, mapping, number, optional, setting
+from training.settings.settings import (
+    InvalidValue,
+    choice,
+    integer,
+    mapping,
+    number,
+    optional,
+    setting,
+)
 
 RESULT = "result.json"
-USUAL = ("reward_type", "fidelity", "guided")
-"""Arguments of the environment that don't make it another task."""
+SAME_TASK = ("reward_type", "fidelity", "observe_task_guide")
+"""Arguments of the environment that do not change the task to be solved."""
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise Unfit("text")
+        raise InvalidValue("text")
     return value
 
 
-def _share(value: Any) -> dict[str, float]:
-    """A share of episodes: how many, with the bounds of its interval."""
+def _rate(value: Any) -> dict[str, float]:
+    """A success rate with the bounds of its confidence interval."""
     names = ("low", "rate", "high")
-    share = number(at_least=0, at_most=1)
-    found: dict[str, float] = mapping(dict.fromkeys(names, share))(value)
+    fraction = number(at_least=0, at_most=1)
+    found: dict[str, float] = mapping(dict.fromkeys(names, fraction))(value)
     if set(found) != set(names) or not found["low"] <= found["rate"] <= found["high"]:
-        raise Unfit("a mapping of low, rate and high, in rising order")
+        raise InvalidValue("a mapping of low, rate and high, in ascending order")
     return found
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """How a run went, and what it takes to do it again."""
+    """The outcome of a training run, and what is needed to repeat it."""
 
     algorithm: str = setting(choice("ppo", "sac"))
     """Name of the algorithm."""
     env_id: str = setting(_text)
     """Environment id, with its version."""
     arguments: dict[str, Any] = setting(mapping())
-    """Arguments of the environment."""
+    """Arguments of the environment at the end of training and in the evaluation."""
     seed: int = setting(integer(0))
     """Seed of training."""
     steps: int = setting(integer(1))
     """Environment steps of training, summed over worlds."""
     seconds: float = setting(number(above=0))
     """Wall time of training, in seconds."""
-    environment_share: float = setting(number(at_least=0, at_most=1))
-    """Share of that time spent in the environments."""
+    environment_time_fraction: float = setting(number(at_least=0, at_most=1))
+    """Fraction of that time spent in the environments."""
     episodes: int = setting(integer(1))
-    """How many the policy was evaluated on."""
+    """Number of episodes of the evaluation."""
     first_seed: int = setting(integer(0))
-    """Seed of the first of them."""
+    """Seed of the first of these episodes."""
     fidelity: str | None = setting(optional(_text))
-    """Preset at which they were played; None for the environment's own."""
-    success_at_end: dict[str, float] = setting(_share)
-    """Share of episodes that ended in success, as low, rate, high; the interval is Wilson's."""
-    success_at_any_time: dict[str, float] = setting(_share)
-    """Share of episodes that met the goal after some step, likewise."""
+    """Fidelity preset of these episodes; None for the default of the environment."""
+    success_at_end: dict[str, float] = setting(_rate)
+    """Fraction of the episodes that ended in success: low, rate, high (95 % Wilson interval)."""
+    success_at_any_time: dict[str, float] = setting(_rate)
+    """Fraction of the episodes that reached the goal after any step, likewise."""
     command: str = setting(_text)
-    """What trains it again, with the source of `commit`."""
+    """Command that repeats the training, with the code of `commit`."""
     commit: str | None = setting(optional(_text))
-    """Git commit of the source that trained it, if known."""
+    """Git commit of the training code, if known."""
     resumed: int = setting(integer(0))
-    """How often the run was resumed."""
+    """Number of times that the run was resumed."""
     started: str = setting(_text)
-    """When training began, in UTC."""
+    """Start of training, in UTC."""
     versions: dict[str, Any] = setting(mapping())
-    """Python, platform and packages that trained it."""
+    """Versions of Python, platform and packages in training."""
 
     @property
     def task(self) -> str:
-        """The environment and what makes it another task, as part of the name of a folder."""
+        """Name of the task, as part of a folder name, see `task_name`."""
         return task_name(self.env_id, self.arguments)
 
     @property
     def kind(self) -> str:
-        """Algorithm and task: results of the same kind differ by their seed."""
+        """Algorithm and task; results of the same kind differ only in their seed."""
         return f"{self.algorithm}-{self.task}"
 
     def folder(self, repository: Path) -> Path:
-        """Where it is kept."""
+        """The folder of the result in the repository."""
         return repository / "results" / self.algorithm / f"{self.task}_seed{self.seed}"
 
     def as_json(self) -> str:
-        """A file that `read_result` reads back to an equal result."""
+        """The text of a file that `read_result` reads back to an equal result."""
         return json.dumps(dataclasses.asdict(self), indent=2) + "\n"
 
 
 def task_name(env_id: str, arguments: dict[str, Any]) -> str:
-    """An environment and its arguments as a name, as in RigidEnvs-Push-v0-target_yaw-true.
+    """Name of the task that an environment and its arguments define.
+
+    As RigidEnvs-Push-v0-target_yaw-true. A dense id and its plain id are the same task.
 
     Args:
         env_id: Environment id.
-        arguments: Its arguments; those of USUAL are left away, and what asks for nothing: what is
-            false or 0, and the steps that an episode has anyway.
+        arguments: Its arguments. The name omits those of SAME_TASK, those that are false or 0, and
+            a `max_episode_steps` equal to the registered one.
     """
-    words = [folder_name(env_id)]
+    words = [folder_name(plain_id(env_id))]
     spec = gym.registry.get(env_id)
-    asked = {name for name, value in arguments.items() if value}
+    changed = {name for name, value in arguments.items() if value}
     if spec is not None and arguments.get("max_episode_steps") == spec.max_episode_steps:
-        asked.discard("max_episode_steps")
-    for name in sorted(asked - set(USUAL)):
+        changed.discard("max_episode_steps")
+    for name in sorted(changed - set(SAME_TASK)):
         value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
         words.append(f"{name}-{value.strip('-')}")
     return "-".join(words)
 
 
 def read_result(file: Path) -> Result:
-    """Reads and checks a result.
+    """Reads and validates a result.
 
     Raises:
-        UsageError: It is missing or no JSON, or a field is missing, unknown or can't be.
+        UsageError: The file is missing or not JSON, or a field is missing, unknown or invalid.
     """
     try:
         values = json.loads(file.read_text(encoding="utf-8"))
@@ -135,14 +146,14 @@ def read_result(file: Path) -> Result:
 
 
 def parse_result(values: Any, source: str) -> Result:
-    """Checks the fields of a result and builds it.
+    """Validates the fields of a result and builds it.
 
     Args:
-        values: Fields by name, as JSON gave them.
-        source: File to name in errors.
+        values: Fields by name, as JSON parsed them.
+        source: File, named in error messages.
 
     Raises:
-        UsageError: As of `read_result`.
+        UsageError: As for `read_result`.
     """
     if not isinstance(values, dict):
         raise UsageError(f"{source} is {values!r:.80}, should be a mapping")
@@ -158,7 +169,7 @@ def parse_result(values: Any, source: str) -> Result:
             raise UsageError(f"{source}: {name} is missing")
         try:
             found[name] = field.metadata["rule"](values[name])
-        except Unfit as error:
+        except InvalidValue as error:
             raise UsageError(
                 f"{source}: {name} is {values[name]!r:.80}, should be {error}"
             ) from None
@@ -166,17 +177,17 @@ def parse_result(values: Any, source: str) -> Result:
 
 
 def read_results(repository: Path) -> list[Result]:
-    """All results of a repository, by kind and seed.
+    """All results of a repository, in the order of kind and seed.
 
     Raises:
-        UsageError: One is damaged, or lies in another folder than its own.
+        UsageError: A result is damaged, or is in a folder that contradicts its content.
     """
     results = []
     for file in (repository / "results").glob(f"*/*/{RESULT}"):
-        if file.parent.suffix == ".tmp":  # of a process that was killed as it wrote
+        if file.parent.suffix == ".tmp":  # left by a killed process
             continue
         result = read_result(file)
         if result.folder(repository) != file.parent:
-            raise UsageError(f"{file} should lie in {result.folder(repository)}")
+            raise UsageError(f"{file} should be in {result.folder(repository)}")
         results.append(result)
     return sorted(results, key=lambda result: (result.kind, result.seed))

@@ -1,4 +1,4 @@
-"""Records finished runs and brings the page of results up to date."""
+"""Records finished runs and updates the page of results."""
 
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
@@ -7,18 +7,18 @@ from pathlib import Path
 from training.policies.policy_file import read_policy
 from training.results.plot import draw_learning_curves, read_curve
 from training.results.record import record
-from training.results.recording import LARGEST, record_run
+from training.results.recording import MAX_FILE_BYTES, record_run
 from training.results.result import Result, read_results
-from training.results.results_page import by_kind, pictures, write_pages
+from training.results.results_page import by_kind, image_paths, write_pages
 from training.runs.run_folder import RunFolder
 from training.settings.config import ALGORITHMS
-from training.settings.errors import UsageError
+from training.settings.errors import UsageError, check_exists
 
 SOURCE = Path(__file__).resolve().parents[2]
-"""The source tree, where results are kept; an installed package has none."""
-FILM_WIDTHS = (320, 240, 160)
-"""Pixels, tried from the largest until a film is small enough."""
-FILM_EPISODES = 3
+"""The source tree with the recorded results; an installed package has none."""
+GIF_WIDTHS = (320, 240, 160)
+"""Pixels, tried in this order until a GIF is small enough."""
+GIF_EPISODES = 3
 
 
 def update_results(
@@ -29,51 +29,52 @@ def update_results(
     episodes: int = 1000,
     replace: bool = False,
     quiet: bool = False,
-    say: Callable[[str], object] = print,
+    report: Callable[[str], object] = print,
 ) -> None:
-    """Records what is finished and not recorded yet, then rewrites page, README and pictures.
+    """Records finished runs that are not recorded yet, then updates page, README and images.
 
     Args:
-        runs: Run folders; all under `log_folder` if none is given.
-        log_folder: Where run folders are.
-        repository: Where results, docs and README are.
-        episodes: How many to evaluate on.
-        replace: Whether the runs given take the place of results of their seeds.
+        runs: Run folders; by default all in `log_folder`.
+        log_folder: Folder of the run folders.
+        repository: Folder with results, docs and README.
+        episodes: Number of episodes of each evaluation.
+        replace: Whether `runs` replace results with the same seeds.
         quiet: Show no progress.
-        say: Takes a line for each run that was recorded or skipped, with the reason, and for each
-            file that was written.
+        report: Called with a line for each run that was recorded or skipped, with the reason, and
+            for each file that was written.
 
     Raises:
-        UsageError: A run that was given is none, or a file of the repository is damaged or missing.
+        UsageError: One of `runs` is not a run folder, or a file of the repository is damaged or
+            missing.
     """
     check_repository(repository)
     if replace and not runs:
-        raise UsageError("--replace takes the run folders that should replace others")
+        raise UsageError("--replace requires run folders: the runs that replace others")
     for path in runs:
-        if not (path / "run.json").exists():
-            raise UsageError(f"{path} is no run folder: run.json is missing")
-    read_results(repository)  # what is damaged should show before anything is evaluated
+        RunFolder(path).check_exists()
+    read_results(repository)  # reports damaged results before anything is evaluated
     for path in runs or _runs(log_folder):
         try:
             result = record_run(RunFolder(path), repository, episodes, replace=replace, quiet=quiet)
         except UsageError as error:
-            say(f"skipped  {path}: {error}")
+            report(f"skipped  {path}: {error}")
         else:
             place = result.folder(repository).relative_to(repository)
-            say(f"recorded {path}: {place}")
+            report(f"recorded {path}: {place}")
             _remove_outdated(result, repository)
     for group in by_kind(read_results(repository)):
-        _draw(group, repository, quiet, say)
+        _update_images(group, repository, quiet, report)
     for path in write_pages(repository):
-        say(f"written  {path}")
+        report(f"written  {path}")
 
 
 def check_repository(repository: Path) -> None:
-    """Raises UsageError where results can't be kept."""
+    """Raises UsageError unless a folder is a clone of this project."""
+    check_exists(repository, "a clone of this project")
     for name in ("README.md", "docs"):
         if not (repository / name).exists():
             raise UsageError(
-                f"{repository} has no {name}: results are kept in a clone of the project; "
+                f"{repository} has no {name}: results are stored in a clone of this project; "
                 "give its folder with --repository"
             )
 
@@ -96,19 +97,19 @@ def _number(path: Path) -> int:
 
 
 def _remove_outdated(result: Result, repository: Path) -> None:
-    """Removes pictures that a new result is missing from, at once: the command may yet be ended."""
-    curve, film = pictures(result.kind)
+    """Removes images that lack a new result, at once because the command may be interrupted."""
+    curve, video = image_paths(result.kind)
     (repository / curve).unlink(missing_ok=True)
     seeds = [other.seed for other in read_results(repository) if other.kind == result.kind]
     if result.seed == min(seeds):
-        (repository / film).unlink(missing_ok=True)
+        (repository / video).unlink(missing_ok=True)
 
 
-def _draw(
-    group: Sequence[Result], repository: Path, quiet: bool, say: Callable[[str], object]
+def _update_images(
+    group: Sequence[Result], repository: Path, quiet: bool, report: Callable[[str], object]
 ) -> None:
-    """Draws the learning curves and films the first seed, where that is missing."""
-    curve, film = pictures(group[0].kind)
+    """Plots the learning curves, and records a GIF of the first seed, if they are missing."""
+    curve, video = image_paths(group[0].kind)
     (repository / curve).parent.mkdir(parents=True, exist_ok=True)
     if not (repository / curve).exists():
         folders = [result.folder(repository) for result in group]
@@ -118,24 +119,24 @@ def _draw(
             title=f"{group[0].env_id}, {group[0].algorithm}",
             labels=[f"seed {result.seed}" for result in group],
         )
-        say(f"drawn    {curve}")
-    if not (repository / film).exists():
-        _film(group[0].folder(repository) / "policy.policy", repository / film, quiet)
-        say(f"filmed   {film}")
+        report(f"plotted  {curve}")
+    if not (repository / video).exists():
+        _record_gif(group[0].folder(repository) / "policy.policy", repository / video, quiet)
+        report(f"video    {video}")
 
 
-def _film(policy_file: Path, film: Path, quiet: bool) -> None:
-    """Films a policy as large as its file may be."""
+def _record_gif(policy_file: Path, video: Path, quiet: bool) -> None:
+    """Records a GIF of a policy at the largest width for which the file is small enough."""
     policy = read_policy(policy_file)
-    for width in FILM_WIDTHS:
-        with tempfile.TemporaryDirectory() as folder:  # a film comes with a still
+    for width in GIF_WIDTHS:
+        with tempfile.TemporaryDirectory() as folder:  # `record` writes a still image too
             made, _ = record(
                 policy,
-                Path(folder) / film.name,
-                episodes=FILM_EPISODES,
+                Path(folder) / video.name,
+                episodes=GIF_EPISODES,
                 gif_width=width,
                 quiet=quiet,
             )
-            if made.stat().st_size <= LARGEST or width == FILM_WIDTHS[-1]:
-                film.write_bytes(made.read_bytes())
+            if made.stat().st_size <= MAX_FILE_BYTES or width == GIF_WIDTHS[-1]:
+                video.write_bytes(made.read_bytes())
                 return

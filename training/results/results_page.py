@@ -1,4 +1,4 @@
-"""docs/results.md and the table of the README: text made of the results, and of nothing else."""
+"""Generates docs/results.md and the table in README.md from the recorded results alone."""
 
 import re
 import statistics
@@ -7,77 +7,92 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
+
 from training.results.result import Result, read_results
 from training.runs.run_folder import folder_name
-from training.settings.config import TrainConfig, load_config
+from training.settings.config import TrainConfig
+from training.settings.config_file import load_config
+from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError
 
 PAGE = Path("docs/results.md")
 README = Path("README.md")
-PICTURES = Path("docs/results")
-NONE_YET = (
-    "No run is recorded yet: `rigid-envs results` records those that are finished under `runs/`."
-)
+IMAGES = Path("docs/results")
+NONE_YET = "No run is recorded yet. `rigid-envs results` records the finished runs in `runs/`."
 HEAD = """\
 # Results
 
-Trained policies on the environments, each evaluated on episodes that it was not trained on, acting
-by its mean. `rigid-envs results` writes this page from the files under `results/`; the settings,
-the learning curve and the policy of every row lie there too. `rigid-envs evaluate
-results/<algo>/<run>/policy.policy` measures one again, `rigid-envs record` films it, and the
-command below a table trains it anew: to the same policy with the commit and packages of then on
-the same kind of machine, to much the same with others.
+Trained policies, each evaluated on episodes that it was not trained on, with its mean action.
+`rigid-envs results` generates this page from the files in `results/`; these include the settings,
+the learning curve and the policy of each row.
 
-Wall time is that of training alone, without compiling what was compiled before and without
-evaluation; the share in the environments is what their steps took of it. Success at the end counts
-episodes whose goal is met when they end, success at any time those that met it after some step;
-intervals are Wilson's at 95 %. ± is the standard deviation over seeds.
+```sh
+rigid-envs evaluate results/ppo/RigidEnvs-Push-v0_seed0/policy.policy  # measure a policy again
+rigid-envs record results/ppo/RigidEnvs-Push-v0_seed0/policy.policy    # record a video of it
+```
+
+The commands below each table repeat the training. With the same commit, packages and kind of
+machine they give the same policy, otherwise a similar one.
+
+| column | meaning |
+|---|---|
+| seed | seed of training |
+| steps | environment steps of training, summed over worlds |
+| wall time | time of training, without compilation and evaluation |
+| in environments | fraction of the wall time spent in the steps of the environments |
+| success at the end | fraction of episodes whose goal is reached at the end |
+| at any time | fraction of episodes whose goal is reached after any step |
+| commit | git commit of the training code |
+
+Intervals in parentheses are 95 % confidence intervals (Wilson). ± is the standard deviation over
+seeds.
 """
-_PLACE = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
+_BLOCK = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
 def page_text(results: Sequence[Result], repository: Path) -> str:
-    """The whole of docs/results.md, of results by kind and seed, and their settings."""
+    """The text of docs/results.md, from results in the order of kind and seed."""
     if not results:
         return f"{HEAD}\n{NONE_YET}\n"
     sections = []
     for group in by_kind(results):
-        one = group[0]
-        file = one.folder(repository) / "config.yaml"
-        sections.append(_section(group, load_config(one.algorithm, one.env_id, file)))
+        first = group[0]
+        file = first.folder(repository) / "config.yaml"
+        sections.append(_section(group, load_config(first.algorithm, first.env_id, file)))
     return "\n".join([HEAD, *sections])
 
 
 def readme_text(text: str, results: Sequence[Result]) -> str:
-    """README's text with the table of the results in its place.
+    """The text of README.md, with the table of results between its two markers.
 
     Raises:
-        UsageError: The text has no place for it.
+        UsageError: The text has no markers.
     """
-    if not _PLACE.search(text):
+    if not _BLOCK.search(text):
         raise UsageError(f"{README} has no lines <!-- results --> and <!-- /results -->")
     block = _summary(results) if results else f"{NONE_YET}\n"
-    return _PLACE.sub(lambda found: found[1] + block + found[2], text)
+    return _BLOCK.sub(lambda found: found[1] + block + found[2], text)
 
 
 def by_kind(results: Sequence[Result]) -> list[list[Result]]:
-    """The results that differ by their seed only, together."""
+    """Groups the results that differ only in their seed."""
     return [list(group) for _, group in groupby(results, key=lambda result: result.kind)]
 
 
-def pictures(kind: str) -> tuple[Path, Path]:
-    """Learning curve and film of a kind, in the repository."""
-    return PICTURES / f"{kind}.png", PICTURES / f"{kind}.gif"
+def image_paths(kind: str) -> tuple[Path, Path]:
+    """Paths in the repository of the learning curve and the video of a kind."""
+    return IMAGES / f"{kind}.png", IMAGES / f"{kind}.gif"
 
 
 def write_pages(repository: Path) -> list[Path]:
-    """Brings the page and the README up to date.
+    """Updates the page and the README.
 
     Returns:
-        Those that were other before.
+        The files that have changed.
 
     Raises:
-        UsageError: A result is damaged, or the README has no place for its table.
+        UsageError: A result is damaged, or the README has no markers.
     """
     written = []
     for path, text in _expected(repository).items():
@@ -90,21 +105,21 @@ def write_pages(repository: Path) -> list[Path]:
 
 
 def check_pages(repository: Path) -> None:
-    """Raises UsageError where the page or the README is out of date, or a file is missing."""
+    """Raises UsageError if the page or the README is out of date, or a file is missing."""
     for path, text in _expected(repository).items():
         file = repository / path
         if not file.exists() or file.read_text(encoding="utf-8") != text:
-            raise UsageError(f"{path} is not what the files under results/ say: rigid-envs results")
+            raise UsageError(f"{path} is out of date; to generate it: rigid-envs results")
     for result in read_results(repository):
-        needed = [repository / path for path in pictures(result.kind)]
+        images = [repository / path for path in image_paths(result.kind)]
         own = ("config.yaml", "progress.csv", "policy.policy")
-        for file in [*needed, *(result.folder(repository) / name for name in own)]:
+        for file in [*images, *(result.folder(repository) / name for name in own)]:
             if not file.exists():
-                raise UsageError(f"{file} is missing: rigid-envs results")
+                raise UsageError(f"{file} is missing; to generate it: rigid-envs results")
 
 
 def _expected(repository: Path) -> dict[Path, str]:
-    """Text of the page and of the README by their path in the repository."""
+    """Text of the page and of the README, by their path in the repository."""
     results = read_results(repository)
     try:
         readme = (repository / README).read_text(encoding="utf-8")
@@ -113,24 +128,13 @@ def _expected(repository: Path) -> dict[Path, str]:
     return {PAGE: page_text(results, repository), README: readme_text(readme, results)}
 
 
-def _arguments(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"`{name}: {value}`" for name, value in values.items())
-
-
 def _section(group: Sequence[Result], settings: TrainConfig) -> str:
-    """A task and algorithm: its table, commands, pictures."""
-    first, given = group[0], _arguments(group[0].arguments)
-    begun = {k: v for k, v in settings.env_kwargs.items() if v != first.arguments.get(k)}
-    before = (
-        f" Trained with {_arguments(begun)} until the last part, of {settings.finish_timesteps:,} "
-        "steps."
-        if begun
-        else ""
-    )
+    """The section of a kind: its table, commands and images."""
+    first = group[0]
     lines = [
-        f"## {first.env_id}, {first.algorithm.upper()}",
+        f"## {plain_id(first.env_id)}, {first.algorithm.upper()}",
         "",
-        (f"With {given}." if given else "With the environment's own arguments.") + before,
+        _environment(first) + _first_stage(first, settings),
         "",
         "| seed | steps | wall time | in environments "
         "| success at the end | at any time | commit |",
@@ -139,7 +143,7 @@ def _section(group: Sequence[Result], settings: TrainConfig) -> str:
     for one in group:
         lines.append(
             f"| {one.seed} | {one.steps:,} | {one.seconds:.0f} s | "
-            f"{100 * one.environment_share:.0f} % | "
+            f"{100 * one.environment_time_fraction:.0f} % | "
             f"{_interval(one.success_at_end)} | {_interval(one.success_at_any_time)} | "
             f"{_short(one.commit)} |"
         )
@@ -147,64 +151,90 @@ def _section(group: Sequence[Result], settings: TrainConfig) -> str:
         cells = [
             _over_seeds(group, lambda one: one.steps, "{:,.0f}"),
             _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
-            _over_seeds(group, lambda one: 100 * one.environment_share, "{:.0f}", " %"),
+            _over_seeds(group, lambda one: 100 * one.environment_time_fraction, "{:.0f}", " %"),
             _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
             _over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
         ]
         lines.append(f"| mean | {' | '.join(cells)} | |")
     lines += ["", "```sh", *(one.command for one in group), "```", ""]
-    lines += [*_circumstances(group), ""]
-    curve, film = (path.relative_to(PAGE.parent).as_posix() for path in pictures(first.kind))
+    lines += [*_grouped(group, _evaluation), *_grouped(group, _versions), ""]
+    curve, video = (path.relative_to(PAGE.parent).as_posix() for path in image_paths(first.kind))
     lines += [f"![Learning curves of {first.kind}]({curve})", ""]
-    lines += [f"![Three episodes of the policy of seed {first.seed}]({film})", ""]
+    lines += [f"![Three episodes of the policy of seed {first.seed}]({video})", ""]
     return "\n".join(lines)
 
 
-def _circumstances(group: Sequence[Result]) -> list[str]:
-    """How the runs were evaluated and what with they were made, each said once."""
-    lines = []
-    for text in (_evaluation, _made_with):
-        for said, seeds in _alike(group, text).items():
-            which = "" if len(seeds) == len(group) else f"Seed {', '.join(seeds)}: "
-            lines.append(f"{which}{said}")
-    return lines
+def _environment(result: Result) -> str:
+    """The sentence that names the environment of a section, by both of its ids if dense."""
+    given, dense = _arguments(result.arguments), _dense_id_of(result)
+    text = f"`{result.env_id}` with {given or 'its default arguments'}."
+    if dense is None:
+        return text
+    return f"{text} `{dense}` is `{plain_id(dense)}` with `reward_type: dense` by default."
 
 
-def _alike(group: Sequence[Result], text: Callable[[Result], str]) -> dict[str, list[str]]:
-    """Seeds by what is said of them."""
-    said: dict[str, list[str]] = {}
-    for one in group:
-        said.setdefault(text(one), []).append(str(one.seed))
-    return said
-
-
-def _evaluation(one: Result) -> str:
-    resumed = f" Training was resumed {one.resumed} times." if one.resumed else ""
+def _first_stage(result: Result, settings: TrainConfig) -> str:
+    """The sentence on the arguments before the fine-tuning stage; empty without such a stage."""
+    changed = {k: v for k, v in settings.env_kwargs.items() if v != result.arguments.get(k)}
+    if not changed:
+        return ""
     return (
-        f"Evaluated on {one.episodes:,} episodes from seed {one.first_seed:,} on, "
-        f"fidelity {one.fidelity or 'as the environment has it'}.{resumed}"
+        f" Trained with {_arguments(changed)} until the fine-tuning stage, the last "
+        f"{settings.finetune_timesteps:,} steps."
     )
 
 
-def _made_with(one: Result) -> str:
+def _dense_id_of(result: Result) -> str | None:
+    """The registered dense id of the environment, if the result has the dense reward."""
+    dense = dense_id(result.env_id)
+    has_it = result.env_id == dense or result.arguments.get("reward_type") == "dense"
+    return dense if has_it and dense in gym.registry else None
+
+
+def _arguments(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"`{name}: {value}`" for name, value in values.items())
+
+
+def _grouped(group: Sequence[Result], text: Callable[[Result], str]) -> list[str]:
+    """The text about each result, once if it is the same, otherwise after the seeds it is about."""
+    seeds_by_text: dict[str, list[str]] = {}
+    for one in group:
+        seeds_by_text.setdefault(text(one), []).append(str(one.seed))
+    if len(seeds_by_text) == 1:
+        return list(seeds_by_text)
+    return [f"Seed {', '.join(seeds)}: {line}" for line, seeds in seeds_by_text.items()]
+
+
+def _evaluation(one: Result) -> str:
+    times = "once" if one.resumed == 1 else f"{one.resumed} times"
+    resumed = f" Training was resumed {times}." if one.resumed else ""
+    return (
+        f"Evaluated on {one.episodes:,} episodes with seeds from {one.first_seed:,}, "
+        f"fidelity {one.fidelity or 'default'}.{resumed}"
+    )
+
+
+def _versions(one: Result) -> str:
     versions = {**one.versions}
     if isinstance(platform := versions.get("platform"), str):
-        versions["platform"] = platform.partition("-")[0]  # the kernel's build says nothing here
-    return f"Made with {', '.join(f'{name} {value}' for name, value in versions.items())}."
+        versions["platform"] = platform.partition("-")[0]  # without the build of the kernel
+    return f"Trained with {', '.join(f'{name} {value}' for name, value in versions.items())}."
 
 
 def _summary(results: Sequence[Result]) -> str:
-    """The block of the README: a row a kind, and the films."""
+    """The block of the README: a row for each kind, and the videos."""
     lines = [
         "| task | algorithm | seeds | steps | wall time | success at the end | at any time |",
         "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
     ]
-    films = []
+    videos = []
     for group in by_kind(results):
         first = group[0]
-        extra = first.task.removeprefix(folder_name(first.env_id)).removeprefix("-")
+        plain, dense = plain_id(first.env_id), _dense_id_of(first)
+        name = plain if dense is None else f"{plain} ({dense.rpartition('/')[2]})"
+        arguments = first.task.removeprefix(folder_name(plain)).removeprefix("-")
         cells = [
-            f"{first.env_id} {extra}".strip(),
+            f"{name} {arguments}".strip(),
             first.algorithm.upper(),
             str(len(group)),
             _over_seeds(group, lambda one: one.steps / 1e6, "{:.2f}", " million"),
@@ -213,9 +243,9 @@ def _summary(results: Sequence[Result]) -> str:
             _over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
         ]
         lines.append(f"| {' | '.join(cells)} |")
-        film = pictures(first.kind)[1].as_posix()
-        films.append(f"![{first.env_id}, {first.algorithm.upper()}]({film})")
-    return "\n".join([*lines, "", *films, ""])
+        video = image_paths(first.kind)[1].as_posix()
+        videos.append(f"![{plain}, {first.algorithm.upper()}]({video})")
+    return "\n".join([*lines, "", *videos, ""])
 
 
 def _short(commit: str | None) -> str:
@@ -225,15 +255,15 @@ def _short(commit: str | None) -> str:
     return f"{digits[:10]}{dash}{dirty}"
 
 
-def _interval(share: dict[str, float]) -> str:
-    low, rate, high = (f"{100 * share[name]:.1f}" for name in ("low", "rate", "high"))
-    return f"{rate} % ({low} to {high})"
+def _interval(rate: dict[str, float]) -> str:
+    low, middle, high = (f"{100 * rate[name]:.1f}" for name in ("low", "rate", "high"))
+    return f"{middle} % ({low} to {high})"
 
 
 def _over_seeds(
     group: Sequence[Result], value: Callable[[Result], float], form: str, unit: str = ""
 ) -> str:
-    """Mean ± standard deviation; of a single seed its value."""
+    """Mean ± standard deviation over seeds; the value alone for a single seed."""
     values = [value(one) for one in group]
     mean = form.format(statistics.fmean(values))
     if len(values) == 1:

@@ -1,1 +1,1 @@
-"""Run folders: what a training run writes, and where."""
+"""Run folders: the files that a training run writes, and where."""

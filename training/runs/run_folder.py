@@ -1,11 +1,11 @@
-"""A folder for each training run: never used twice, and it says what made it.
+"""A new folder for each training run, with a record of how the run was started.
 
-runs/<algo>/<env id>_<number>/
+runs/<algo>/<environment>_<number>/
     config.yaml      the settings, readable by `rigid-envs train --config`
-    run.json         algorithm, environment, command, seed, git commit, time of start
-    versions.json    Python, platform and packages
-    progress.csv     the learning curve; events.out.tfevents.* the same for TensorBoard
-    checkpoint_<n>/  the policy, and what training goes on from, see checkpoint.py
+    run.json         algorithm, environment, command, seed, git commit, start time
+    versions.json    versions of Python, platform and packages
+    progress.csv     the learning curve; events.out.tfevents.* is the same for TensorBoard
+    checkpoint_<n>/  the policy, and the state that training resumes from, see checkpoint.py
 """
 
 import io
@@ -22,12 +22,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from training.settings.config import TrainConfig, load_config
-from training.settings.errors import UsageError
+from training.settings.config import TrainConfig
+from training.settings.config_file import load_config
+from training.settings.errors import UsageError, check_exists
 
 try:
     import fcntl
-except ImportError:  # not on Windows, where nothing keeps two processes apart
+except ImportError:  # Windows has no fcntl: run folders are not locked there
     fcntl = None  # type: ignore[assignment]
 
 CHECKPOINT = "checkpoint"
@@ -42,7 +43,7 @@ class RunFolder:
     """The folder."""
 
     def checkpoints(self) -> list[tuple[int, Path]]:
-        """Number and path of each checkpoint: of the highest, which is whole, and of remains."""
+        """Number and path of each checkpoint; only the one with the highest number is valid."""
         return [
             (int(path.name.removeprefix(f"{CHECKPOINT}_")), path)
             for path in self.path.glob(f"{CHECKPOINT}_*")
@@ -51,22 +52,22 @@ class RunFolder:
 
     @property
     def checkpoint(self) -> Path:
-        """The last checkpoint; the folder itself before the first."""
+        """The last checkpoint; the folder itself before the first one."""
         return max(self.checkpoints(), default=(0, self.path))[1]
 
     @property
     def policy(self) -> Path:
-        """What acts, as of the last checkpoint."""
+        """The policy file of the last checkpoint."""
         return self.checkpoint / "policy.policy"
 
     @property
     def model(self) -> Path:
-        """Stable-Baselines3's model, as of the last checkpoint."""
+        """Stable-Baselines3's model of the last checkpoint."""
         return self.checkpoint / "model.zip"
 
     @property
     def normalization(self) -> Path:
-        """Its statistics of the observations; absent if they are not normalised."""
+        """Stable-Baselines3's observation statistics; absent without normalisation."""
         return self.checkpoint / "vecnormalize.pkl"
 
     @property
@@ -74,75 +75,81 @@ class RunFolder:
         """The learning curve."""
         return self.path / "progress.csv"
 
+    def check_exists(self) -> None:
+        """Raises UsageError unless the folder exists and holds a run."""
+        check_exists(self.path, "a run folder")
+        if not (self.path / "run.json").exists():
+            raise UsageError(f"{self.path} is not a run folder: run.json is missing")
+
     def config(self) -> TrainConfig:
-        """The settings that the run was made with.
+        """The settings of the run.
 
         Raises:
             UsageError: The folder holds no run, or its files are damaged.
         """
+        self.check_exists()
         description = self.path / "run.json"
         try:
             run = json.loads(description.read_text(encoding="utf-8"))
             algo, env_id = run["algo"], run["env_id"]
-        except OSError:
-            raise UsageError(f"{self.path} is no run folder: run.json is missing") from None
-        except (ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError):
             raise UsageError(f"{description} is damaged: algo or env_id cannot be read") from None
         return load_config(algo, env_id, self.path / "config.yaml")
 
     @contextmanager
-    def claimed(self) -> Iterator[None]:
-        """Keeps other processes from training here; the claim ends with ours, however it ends.
+    def locked(self) -> Iterator[None]:
+        """Locks the run against training by another process; released when this process ends.
 
         Raises:
-            UsageError: Another process trains here.
+            UsageError: Another process is training this run.
         """
         with (self.path / "config.yaml").open("rb") as file:
             if fcntl is not None:
                 try:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    raise UsageError(f"{self.path} is being trained by another process") from None
+                    raise UsageError(f"another process is training {self.path}") from None
             yield
 
-    def note_resumption(self, steps: int) -> None:
-        """Adds to run.json that the run goes on, from how many steps and by which command.
+    def record_resumption(self, steps: int) -> None:
+        """Adds the resumption to run.json: from which step, by which command, when.
 
         Raises:
-            UsageError: It cannot be written.
+            UsageError: run.json cannot be written.
         """
         description = self.path / "run.json"
         try:
             run = json.loads(description.read_text(encoding="utf-8"))
-            run.setdefault("resumed", []).append({"steps": steps, **_circumstances()})
+            run.setdefault("resumed", []).append({"steps": steps, **_provenance()})
             _write_text(description, json.dumps(run, indent=2) + "\n")
         except OSError as error:
             raise UsageError(f"{description} cannot be written: {error.strerror}") from None
 
 
 def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
-    """Makes the next free folder of the algorithm and environment, and describes the run in it.
+    """Creates the next folder of the algorithm and environment, and writes how the run started.
 
     Raises:
-        UsageError: The folder cannot be made.
+        UsageError: The folder cannot be created or written.
     """
     number = 1 + max((n for n, _ in _runs(log_folder, config.algo, config.env_id)), default=0)
-    parent = _parent(log_folder, config.algo)
+    parent = log_folder / config.algo
     try:
         parent.mkdir(parents=True, exist_ok=True)
         path = _make_next(parent / folder_name(config.env_id), number)
     except OSError as error:
-        raise UsageError(f"cannot make a folder in {parent}: {error.strerror}") from None
+        raise UsageError(f"cannot create a folder in {parent}: {error.strerror}") from None
     run = {
         "algo": config.algo,
         "env_id": config.env_id,
         "seed": config.seed,
-        **_circumstances(),
+        **_provenance(),
     }
     try:
         _write_text(path / "config.yaml", config.as_yaml())
         _write_text(path / "versions.json", json.dumps(package_versions(), indent=2) + "\n")
-        _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")  # last: a run it is now
+        # last, because run.json marks the folder as a run
+        _write_text(path / "run.json", json.dumps(run, indent=2) + "\n")
     except OSError as error:
         raise UsageError(f"cannot write to {path}: {error.strerror}") from None
     return RunFolder(path)
@@ -157,17 +164,17 @@ def latest_run(log_folder: Path, algo: str, env_id: str) -> RunFolder:
     runs = _runs(log_folder, algo, env_id)
     if not runs:
         raise UsageError(
-            f"no run of {algo} on {env_id} under {log_folder}; "
-            f"make one: rigid-envs train --algo {algo} --env {env_id}"
+            f"no run of {algo} on {env_id} in {log_folder}; "
+            f"to train one: rigid-envs train --algo {algo} --env {env_id}"
         )
     return RunFolder(max(runs)[1])
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[io.BufferedWriter]:
-    """A file to write that appears at `path` only once it is complete.
+def atomic_write(path: Path) -> Iterator[io.BufferedWriter]:
+    """Opens a file that replaces `path` only once it is complete.
 
-    Until then, and for good if writing fails, what was there before stays.
+    If writing fails, the previous file remains.
     """
     unfinished = path.with_name(path.name + ".tmp")
     try:
@@ -180,51 +187,13 @@ def written_whole(path: Path) -> Iterator[io.BufferedWriter]:
         unfinished.unlink(missing_ok=True)
 
 
-def _circumstances() -> dict[str, Any]:
-    return {
-        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
-        "git_commit": git_commit(),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def _make_next(prefix: Path, number: int) -> Path:
-    """Makes the first folder <prefix>_<number> that does not exist, from `number` on."""
-    while True:
-        path = prefix.with_name(f"{prefix.name}_{number}")
-        try:
-            path.mkdir()
-            return path
-        except FileExistsError:  # another run took the number in the meantime
-            number += 1
-
-
-def _write_text(path: Path, text: str) -> None:
-    with written_whole(path) as file:
-        file.write(text.encode("utf-8"))
-
-
-def _parent(log_folder: Path, algo: str) -> Path:
-    return log_folder / algo
-
-
 def folder_name(env_id: str) -> str:
-    """An environment id as part of the name of a folder, as in RigidEnvs-Push-v0."""
+    """An environment id as part of a folder name, as in RigidEnvs-Push-v0."""
     return env_id.replace("/", "-").replace(":", "-")
 
 
-def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
-    """Number and path of each run of the algorithm on the environment."""
-    prefix = folder_name(env_id) + "_"
-    return [
-        (int(path.name.removeprefix(prefix)), path)
-        for path in _parent(log_folder, algo).glob(f"{prefix}*")
-        if path.name.removeprefix(prefix).isdecimal()
-    ]
-
-
 def package_versions() -> dict[str, Any]:
-    """Of Python, the platform and the packages that decide a run."""
+    """Versions of Python, the platform and the packages that affect a run."""
     versions: dict[str, Any] = {
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -239,20 +208,55 @@ def package_versions() -> dict[str, Any]:
 
 
 def git_commit() -> str | None:
-    """The commit of this project's source tree, with "-dirty" where tracked files differ from it.
+    """The commit of this project's source tree, with "-dirty" if tracked files have changed.
 
-    None if it is installed from elsewhere.
+    None if the package is not run from its git repository.
     """
     source = Path(__file__).resolve().parents[2]
     try:
         top, commit = _git(source, "rev-parse", "--show-toplevel", "HEAD").splitlines()
-        # A site-packages inside somebody's repository must not report that repository's commit.
+        # a site-packages folder within another repository must not report that one's commit
         if Path(top).resolve() != source:
             return None
         changes = _git(source, "status", "--porcelain", "--untracked-files=no")
     except (OSError, subprocess.CalledProcessError):
         return None
     return f"{commit}-dirty" if changes else commit
+
+
+def _provenance() -> dict[str, Any]:
+    """Command, commit and time, for run.json."""
+    return {
+        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "git_commit": git_commit(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _make_next(prefix: Path, number: int) -> Path:
+    """Creates the first folder <prefix>_<number> that does not exist, counting up from `number`."""
+    while True:
+        path = prefix.with_name(f"{prefix.name}_{number}")
+        try:
+            path.mkdir()
+            return path
+        except FileExistsError:  # another process took this number in the meantime
+            number += 1
+
+
+def _write_text(path: Path, text: str) -> None:
+    with atomic_write(path) as file:
+        file.write(text.encode("utf-8"))
+
+
+def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
+    """Number and path of each run of the algorithm on the environment."""
+    prefix = folder_name(env_id) + "_"
+    return [
+        (int(path.name.removeprefix(prefix)), path)
+        for path in (log_folder / algo).glob(f"{prefix}*")
+        if path.name.removeprefix(prefix).isdecimal()
+    ]
 
 
 def _git(source: Path, *words: str) -> str:

@@ -1,1 +1,1 @@
-"""The Stable-Baselines3 adapter: training, callbacks, checkpoints."""
+"""Training with Stable-Baselines3: adapter, callbacks, checkpoints."""

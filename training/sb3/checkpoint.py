@@ -1,13 +1,13 @@
-"""Checkpoints: folders that appear whole or not at all, so that files of two never mix.
+"""Checkpoints, each a folder that is written atomically: files of two are never mixed.
 
     checkpoint_<number>/
-        policy.policy                 what acts
-        model.zip, vecnormalize.pkl   the same in Stable-Baselines3's own form
-        state.json, tensors.pt, replay.npz   what training goes on from, see model_state.py
+        policy.policy                 the policy
+        model.zip, vecnormalize.pkl   the policy in Stable-Baselines3's own formats
+        state.json, tensors.pt, replay.npz   the state that training resumes from, see model_state
         progress.csv                  the learning curve so far
 
-A checkpoint is written aside, brought to the disk and renamed; only then the one before is
-removed. The highest number counts, whenever the process may have been killed.
+A checkpoint is written to a temporary folder, flushed to the disk and renamed. Only then is the
+previous one removed. If the process is killed at any moment, the highest number is valid.
 """
 
 import io
@@ -34,7 +34,7 @@ TRANSIENT = [
     "ep_info_buffer",
     "ep_success_buffer",
 ]
-"""What a policy does not need: thousands of worlds make it the greater part of the file."""
+"""Attributes that a policy does not need; with thousands of worlds they are most of the file."""
 
 
 def save_checkpoint(
@@ -46,15 +46,15 @@ def save_checkpoint(
     seconds_in_envs: float | None = 0.0,
     finished: bool = False,
 ) -> None:
-    """Replaces the folder's checkpoint; if that fails, the one before stays.
+    """Replaces the checkpoint of a run; if that fails, the previous one remains.
 
     Args:
-        model: What trains.
+        model: The model in training.
         folder: The run.
         config: Its settings.
         seconds: Wall time of training so far, in seconds.
-        seconds_in_envs: How much of it was spent in the environments; None if that is not known.
-        finished: Whether training is over, so that it can't be resumed.
+        seconds_in_envs: Part of it that was spent in the environments; None if unknown.
+        finished: Whether training is complete, so that it cannot be resumed.
 
     Raises:
         UsageError: It cannot be written, as on a full disk, or the model has diverged.
@@ -69,11 +69,11 @@ def save_checkpoint(
     if normalization is not None:
         files[folder.normalization.name] = pickle.dumps(normalization)
 
-    before = folder.checkpoints()
-    number = max((number for number, _ in before), default=0) + 1
+    previous = folder.checkpoints()
+    number = max((number for number, _ in previous), default=0) + 1
     unfinished = folder.path / f"{CHECKPOINT}.tmp"
     try:
-        shutil.rmtree(unfinished, ignore_errors=True)  # of a process that was killed
+        shutil.rmtree(unfinished, ignore_errors=True)  # left by a killed process
         unfinished.mkdir()
         for name, data in files.items():
             _write(unfinished / name, lambda file, data=data: file.write(data))  # type: ignore[misc]
@@ -88,19 +88,19 @@ def save_checkpoint(
     except OSError as error:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise UsageError(
-            f"no checkpoint could be written to {folder.path}: {error.strerror or error}; "
-            + ("the one before is whole" if before else "there is none before it")
+            f"cannot write a checkpoint to {folder.path}: {error.strerror or error}; "
+            + ("the previous one is intact" if previous else "there is no previous one")
         ) from error
-    for _, path in before:
+    for _, path in previous:
         shutil.rmtree(path, ignore_errors=True)
 
 
 class PeriodicCheckpoint(BaseCallback):
-    """Saves between updates, whenever at least `every` steps have passed since the last time.
+    """Saves between updates, when at least `every` steps have passed since the last checkpoint.
 
     Args:
         every: Environment steps between checkpoints.
-        save: Writes one.
+        save: Writes a checkpoint.
     """
 
     def __init__(self, every: int, save: Callable[[], None]):
@@ -109,7 +109,7 @@ class PeriodicCheckpoint(BaseCallback):
         self.save = save
         self.next = every
         self.rollout_from: int | None = None
-        """Steps taken when the rollout began that goes on; None between rollouts."""
+        """Number of steps at the start of the current rollout; None between rollouts."""
 
     def _on_training_start(self) -> None:
         self.next = self.model.num_timesteps + self.every
@@ -135,7 +135,7 @@ def _write(path: Path, write: Callable[[BinaryIO], Any]) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Brings the names in a folder to the disk; where folders can't be opened, nothing to do."""
+    """Flushes a folder's entries to the disk; does nothing where folders cannot be opened."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""The loggers of a run, which go on where a checkpoint stood."""
+"""Loggers that continue the learning curve of a checkpoint."""
 
 import shutil
 import time
@@ -22,10 +22,10 @@ class ContinuedCSV(CSVOutputFormat):
 
 
 class ContinuedTensorBoard(TensorBoardOutputFormat):
-    """Writes a further file of events, which hides older ones from a step on."""
+    """Writes a new event file, which replaces events of older files from a step on."""
 
     def __init__(self, folder: Path, from_step: int):
-        # files are read in the order of their names, which begin with the second of their making
+        # TensorBoard reads files in order of their names, which start with the second of creation
         names = [path.name.split(".") for path in folder.glob("events.out.tfevents.*")]
         while names and int(time.time()) <= max(int(name[3]) for name in names):
             time.sleep(0.05)
@@ -34,17 +34,17 @@ class ContinuedTensorBoard(TensorBoardOutputFormat):
 
 
 def continued_logger(folder: RunFolder, checkpoint: Path, state: dict[str, Any]) -> Logger:
-    """Puts the learning curve back to that of a checkpoint, and goes on with it.
+    """Restores the learning curve of a checkpoint, and returns loggers that continue it.
 
     Args:
         folder: The run.
-        checkpoint: Its checkpoint; rows that were written after it are dropped.
-        state: What `model_state.read_state` says of it.
+        checkpoint: Its checkpoint; rows that were written after it are removed.
+        state: The checkpoint's state, from `model_state.read_state`.
     """
-    kept = checkpoint / folder.progress.name
+    saved = checkpoint / folder.progress.name
     csv: CSVOutputFormat
-    if kept.exists() and kept.stat().st_size:
-        shutil.copyfile(kept, folder.progress)
+    if saved.exists() and saved.stat().st_size:
+        shutil.copyfile(saved, folder.progress)
         csv = ContinuedCSV(folder.progress)
     else:
         csv = CSVOutputFormat(str(folder.progress))

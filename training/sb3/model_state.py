@@ -1,13 +1,13 @@
-"""All that a model has learned and drawn, as files that are read without unpickling.
+"""The state of a model in training, as files that are read without unpickling.
 
-    state.json    steps, updates, episodes, seconds, also in the environments; the last episodes'
-                  outcomes; random numbers
-    tensors.pt    networks, optimisers, statistics of VecNormalize, torch's random numbers; read
-                  with `weights_only`, which makes nothing but tensors and their containers
-    replay.npz    what SAC has in its replay buffer
+    state.json    steps, updates, episodes; wall time, total and in the environments; outcomes of
+                  the last episodes; states of the random number generators
+    tensors.pt    networks, optimisers, statistics of VecNormalize, torch's random state; read with
+                  `weights_only`, which creates only tensors and containers of tensors
+    replay.npz    SAC's replay buffer
 
-With the settings they make a model that goes on where another stopped. The worlds are not kept:
-they begin new episodes, of other seeds than before.
+With the settings, these files restore a model that resumes training. The worlds are not saved: they
+start new episodes with other seeds.
 """
 
 import io
@@ -30,17 +30,17 @@ STATE, TENSORS, REPLAY = "state.json", "tensors.pt", "replay.npz"
 ROWS = ("actions", "rewards", "dones", "timeouts")
 HINDSIGHT_ROWS = ("ep_start", "ep_length")
 RETURN = "return"
-"""Name of the statistics of rewards; those of observations are under observation/<key>."""
+"""Name of the reward statistics; those of observations are named observation/<key>."""
 
 
 def state_files(model: BaseAlgorithm, notes: dict[str, Any]) -> dict[str, bytes]:
     """Content of state.json and tensors.pt.
 
     Args:
-        model: What trains.
-        notes: More to keep in state.json.
+        model: The model in training.
+        notes: Additional entries of state.json.
     """
-    legacy: Any = np.random.get_state()  # noqa: NPY002  (Stable-Baselines3 draws from it)
+    legacy: Any = np.random.get_state()  # noqa: NPY002  (Stable-Baselines3 uses it)
     state = {
         **notes,
         "steps": model.num_timesteps,
@@ -51,7 +51,7 @@ def state_files(model: BaseAlgorithm, notes: dict[str, Any]) -> dict[str, bytes]
             for info in model.ep_info_buffer or ()
         ],
         "last_successes": [bool(success) for success in model.ep_success_buffer or ()],
-        # of the last update, which the next row of the learning curve shows
+        # values of the last update, which belong to the next row of the learning curve
         "unlogged": [
             [name, float(value), model.logger.name_to_excluded[name]]
             for name, value in model.logger.name_to_value.items()
@@ -73,7 +73,7 @@ def state_files(model: BaseAlgorithm, notes: dict[str, Any]) -> dict[str, bytes]
         },
         "random": torch.get_rng_state(),
     }
-    # into memory first: torch takes a full disk for a defect of its own
+    # into memory first: torch reports a full disk as an internal error
     file = io.BytesIO()
     torch.save(tensors, file)
     return {STATE: json.dumps(state).encode("utf-8"), TENSORS: file.getvalue()}
@@ -104,14 +104,14 @@ def read_state(checkpoint: Path) -> dict[str, Any]:
 
 
 def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
-    """Makes a newly built model the one that was kept.
+    """Restores the saved state into a newly built model.
 
     Args:
-        model: A model of the same settings.
+        model: A model with the same settings.
         checkpoint: Folder with the files.
 
     Raises:
-        Exception: Of any kind, where the files are damaged or of a model of other settings.
+        Exception: Of any type, if the files are damaged or belong to a model with other settings.
     """
     state = read_state(checkpoint)
     tensors = torch.load(checkpoint / TENSORS, map_location=model.device, weights_only=True)
@@ -121,12 +121,12 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
     statistics = _statistics(model.get_vec_normalize_env())
     if tensors["statistics"].keys() != statistics.keys():
         raise ValueError(
-            f"its statistics are of {sorted(tensors['statistics'])}, not {sorted(statistics)}"
+            f"it has statistics of {sorted(tensors['statistics'])}, not of {sorted(statistics)}"
         )
     for name, one in statistics.items():
-        kept = tensors["statistics"][name]
-        one.mean, one.var = kept["mean"].cpu().numpy(), kept["var"].cpu().numpy()
-        one.count = float(kept["count"])
+        saved = tensors["statistics"][name]
+        one.mean, one.var = saved["mean"].cpu().numpy(), saved["var"].cpu().numpy()
+        one.count = float(saved["count"])
     if isinstance(model, OffPolicyAlgorithm) and model.replay_buffer is not None:
         _read_replay(model.replay_buffer, checkpoint / REPLAY)
 
@@ -136,15 +136,15 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
     model.ep_info_buffer = deque(state["last_episodes"], maxlen=window)
     model.ep_success_buffer = deque(state["last_successes"], maxlen=window)
     assert model.env is not None
-    # other episodes than those of the start, and the same ones whenever this is resumed
-    mixed = np.random.SeedSequence([model.seed or 0, state["steps"]]).generate_state(1)
-    model.env.seed(int(mixed[0]) // 2)
-    drawn = state["random"]
-    version, numbers, gauss = drawn["python"]
+    # other episodes than at the start of the run, but the same ones at each resumption
+    seed = np.random.SeedSequence([model.seed or 0, state["steps"]]).generate_state(1)
+    model.env.seed(int(seed[0]) // 2)
+    generators = state["random"]
+    version, numbers, gauss = generators["python"]
     random.setstate((version, tuple(numbers), gauss))
-    name, keys, *rest = drawn["numpy"]
+    name, keys, *rest = generators["numpy"]
     np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002
-    model.action_space.np_random.bit_generator.state = drawn["actions"]
+    model.action_space.np_random.bit_generator.state = generators["actions"]
     torch.set_rng_state(tensors["random"].cpu())
 
 
@@ -157,7 +157,7 @@ def _statistics(env: VecNormalize | None) -> dict[str, Any]:
 
 
 def _rows(buffer: ReplayBuffer) -> dict[str, np.ndarray]:
-    """The buffer's arrays by name, whose first axis is the transition."""
+    """The buffer's arrays by name; their first axis is the transition."""
     names = ROWS + (HINDSIGHT_ROWS if isinstance(buffer, HerReplayBuffer) else ())
     rows = {name: getattr(buffer, name) for name in names}
     both: dict[str, Any] = {
@@ -176,6 +176,6 @@ def _read_replay(buffer: ReplayBuffer, file: Path) -> None:
             rows[: len(rows) if buffer.full else buffer.pos] = arrays[name]
         if isinstance(buffer, HerReplayBuffer):
             buffer._current_ep_start = arrays["_current_ep_start"]
-            with warnings.catch_warnings():  # of what is wanted: those episodes don't go on
+            with warnings.catch_warnings():  # it warns that episodes are cut off, as intended
                 warnings.simplefilter("ignore")
                 buffer.truncate_last_trajectory()

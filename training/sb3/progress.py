@@ -1,4 +1,4 @@
-"""What a training run shows and records while it runs."""
+"""Progress display, wall time in the learning curve, and early stopping."""
 
 import time
 from typing import Any
@@ -8,21 +8,22 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
-from training.sb3.finish import FinishElsewhere
+from training.sb3.finetune import FineTuning
 
 SECONDS_BETWEEN_UPDATES = 0.5
 SECONDS_BETWEEN_LINES = 15.0
 
 
 class TrainingProgress(BaseCallback):
-    """A bar with success rate, speed and remaining time; without a terminal, a line now and then.
+    """A progress bar with success rate, speed and remaining time.
 
-    It also records the wall time with each row of the learning curve.
+    Without a terminal it prints a line every 15 s instead. It also records the wall time with each
+    row of the learning curve.
 
     Args:
         total_steps: Environment steps of the run.
         quiet: Show nothing.
-        seconds_before: Wall time of the run before it was resumed.
+        seconds_before: Wall time of the run before it was resumed, in seconds.
     """
 
     def __init__(self, total_steps: int, quiet: bool = False, seconds_before: float = 0.0):
@@ -42,17 +43,17 @@ class TrainingProgress(BaseCallback):
         self.seconds_before = seconds_before
         self.steps_before = 0
         self.task = self.bar.add_task("training", total=total_steps, success="–", speed=0.0)
-        self.started = self.shown = self.written = time.perf_counter()
+        self.started = self.shown = self.printed = time.perf_counter()
 
     def close(self) -> None:
-        """Takes the bar down; safe to call at any time."""
+        """Removes the bar; safe to call at any time."""
         if self.model is not None and self.bar.live.is_started:
             self._show()
         self.bar.stop()
 
     def _on_training_start(self) -> None:
         self.steps_before = self.model.num_timesteps
-        self.started = self.shown = self.written = time.perf_counter()
+        self.started = self.shown = self.printed = time.perf_counter()
         self.bar.start()
 
     def _on_step(self) -> bool:
@@ -69,12 +70,12 @@ class TrainingProgress(BaseCallback):
     def _show(self) -> None:
         now = time.perf_counter()
         speed = (self.model.num_timesteps - self.steps_before) / max(now - self.started, 1e-9)
-        success = success_rate(self.model)
-        shown = "–" if success is None else f"{success:.1%}"
+        rate = success_rate(self.model)
+        shown = "–" if rate is None else f"{rate:.1%}"
         fields: dict[str, Any] = {"success": shown, "speed": speed}
         self.bar.update(self.task, completed=self.num_timesteps, **fields)
-        if not self.console.is_terminal and now - self.written > SECONDS_BETWEEN_LINES:
-            self.written = now
+        if not self.console.is_terminal and now - self.printed > SECONDS_BETWEEN_LINES:
+            self.printed = now
             self.console.print(
                 f"{self.num_timesteps:,} of {self.total_steps:,} steps, "
                 f"success {shown}, {speed:,.0f} steps/s"
@@ -85,15 +86,15 @@ class StopAtSuccess(BaseCallback):
     """Ends training when the success rate over a full window of episodes reaches the target.
 
     Args:
-        target: Share of episodes.
-        finish: Where the run is to finish on other worlds: reached before, the target begins that
-            part, and only reached in it, it ends the run.
+        target: Fraction of the episodes.
+        finetuning: The fine-tuning stage, if any. Reaching the target before this stage starts the
+            stage; reaching it during the stage ends training.
     """
 
-    def __init__(self, target: float, finish: FinishElsewhere | None = None):
+    def __init__(self, target: float, finetuning: FineTuning | None = None):
         super().__init__()
         self.target = target
-        self.finish = finish
+        self.finetuning = finetuning
         self.reached = False
 
     def _on_rollout_end(self) -> None:
@@ -101,17 +102,17 @@ class StopAtSuccess(BaseCallback):
         if episodes is None or len(episodes) < (episodes.maxlen or 0):
             return
         reached = bool(np.mean(episodes) >= self.target)
-        if self.finish is None or self.finish.finishing:
+        if self.finetuning is None or self.finetuning.started:
             self.reached = reached
         elif reached:
-            self.finish.from_steps = 0
+            self.finetuning.from_steps = 0
 
     def _on_step(self) -> bool:
-        # Only now, a step into the next rollout: the update with the last one should not be lost.
+        # one step later than reached, so that the update with the last rollout takes place
         return not self.reached
 
 
 def success_rate(model: Any) -> float | None:
-    """Share of the last episodes that ended in success; None before the first ended."""
+    """Fraction of the last episodes that ended in success; None before the first one ended."""
     episodes = model.ep_success_buffer
     return float(np.mean(episodes)) if episodes else None

@@ -1,8 +1,8 @@
-"""One thread for the network while worlds are stepped.
+"""One torch thread during rollouts.
 
-After each parallel region torch's other threads wait awake for the next one, on the cores that the
-environments could step worlds on. The network's forward pass of a rollout is too small to gain
-anything from more threads; the updates do.
+After each parallel region, torch's worker threads spin while they wait for the next one, on cores
+that the environments could use. The network's forward pass in a rollout is too small to gain from
+more threads; the updates gain.
 """
 
 import torch
@@ -10,7 +10,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 
 class OneThreadRollouts(BaseCallback):
-    """Gives torch a single thread during rollouts, and its own number back for updates."""
+    """Sets torch to one thread during rollouts, and restores the number for updates."""
 
     def __init__(self) -> None:
         super().__init__()

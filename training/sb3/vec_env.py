@@ -1,8 +1,8 @@
-"""The vector environment as Stable-Baselines3 wants it.
+"""Adapter from a Gymnasium vector environment to Stable-Baselines3's `VecEnv`.
 
-Stable-Baselines3 has its own `VecEnv` and no converter from Gymnasium's `VectorEnv`. The two differ
-in what they say at the end of an episode, and a silent slip there costs learning rather than an
-error. Nothing here loops over worlds in Python, except over those whose episode has just ended.
+Stable-Baselines3 has no converter from Gymnasium's `VectorEnv`. The two interfaces differ in what
+they report at the end of an episode; a mistake there raises no error but slows down learning. Only
+worlds whose episode has just ended are looped over in Python.
 """
 
 import time
@@ -18,19 +18,19 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 Observation = dict[str, np.ndarray]
 
-_NOTHING: dict[str, Any] = {}
-"""The info of every world that goes on: one object, since 4,096 worlds have 4,096 infos a step."""
+_EMPTY_INFO: dict[str, Any] = {}
+"""The info of every world whose episode continues: one shared object instead of one per world."""
 
 
 class RigidVecEnv(VecEnv):
     """A Stable-Baselines3 `VecEnv` over a Gymnasium vector environment with dict observations.
 
-    At the end of an episode the info of its world holds `terminal_observation` (a copy),
-    `TimeLimit.truncated` and whatever the environment says of the last step, such as `is_success`.
-    All worlds live in one environment object, so attributes and methods are of all worlds at once.
+    At the end of an episode the info of its world contains `terminal_observation` (a copy),
+    `TimeLimit.truncated`, and the environment's info of the last step, such as `is_success`. All
+    worlds are one environment object, so attributes and methods apply to all worlds at once.
 
     Args:
-        envs: Vector environment with autoreset mode SAME_STEP; closed with this one.
+        envs: Vector environment with autoreset mode SAME_STEP; `close` closes it.
 
     Raises:
         ValueError: The vector environment has another autoreset mode.
@@ -47,7 +47,7 @@ class RigidVecEnv(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> Observation:
-        """Starts new episodes in all worlds; world i gets the seed given to `seed` plus i."""
+        """Starts new episodes in all worlds; world i gets the seed passed to `seed` plus i."""
         observation, infos = self.envs.reset(seed=self._seeds[0], options=self._shared_options())
         self.reset_infos = _info_per_world(infos, np.arange(self.num_envs))
         self._reset_seeds()
@@ -55,22 +55,22 @@ class RigidVecEnv(VecEnv):
         return _copied(observation)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keeps the actions `(num_envs, action_dim)` for `step_wait`."""
+        """Stores the actions `(num_envs, action_dim)` for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Steps all worlds; those that end are reset and their observation is of the new episode.
+        """Steps all worlds. Worlds that end are reset, and return the new episode's observation.
 
         Returns:
-            Observations `{key: (num_envs, k)}`, rewards `(num_envs,)` float32,
-            dones `(num_envs,)` bool, one info a world. None shares memory with the environment.
+            Observations `{key: (num_envs, k)}`, rewards `(num_envs,)` float32, dones `(num_envs,)`
+            bool, and an info for each world. Nothing shares memory with the environment.
         """
         start = time.perf_counter()
         observation, rewards, terminated, truncated, infos = self.envs.step(self._actions)
         self.seconds_in_envs += time.perf_counter() - start
 
         dones = np.logical_or(terminated, truncated)
-        info_list = [_NOTHING] * self.num_envs
+        info_list = [_EMPTY_INFO] * self.num_envs
         ended = np.flatnonzero(dones)
         if ended.size:
             last_infos = _info_per_world(infos["final_info"], ended)
@@ -86,17 +86,17 @@ class RigidVecEnv(VecEnv):
         return _copied(observation), np.array(rewards, dtype=np.float32), dones, info_list
 
     def replace(self, envs: VectorEnv) -> None:
-        """Closes the vector environment and takes another in its place, to be reset next.
+        """Closes the vector environment and uses another one, which must be reset next.
 
         Raises:
-            ValueError: It has other spaces, or another number of worlds.
+            ValueError: Its spaces or its number of worlds differ.
         """
-        self.check_like(envs)
+        self.check_compatible(envs)
         self.envs.close()
         self.envs = envs
 
-    def check_like(self, envs: VectorEnv) -> None:
-        """Raises ValueError where a vector environment can't take the place of the own one."""
+    def check_compatible(self, envs: VectorEnv) -> None:
+        """Raises ValueError if a vector environment cannot replace the present one."""
         for name in ("num_envs", "single_observation_space", "single_action_space"):
             old, new = getattr(self.envs, name), getattr(envs, name)
             if old != new:
@@ -107,19 +107,19 @@ class RigidVecEnv(VecEnv):
         self.envs.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """A picture of each world."""
+        """A frame of each world."""
         frames: Any = self.envs.render()
         return list(frames)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The attribute of the vector environment, once for each index."""
+        """The attribute of the vector environment, repeated for each index."""
         return [self._find(attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Sets an attribute of the vector environment, for all worlds.
 
         Raises:
-            ValueError: `indices` names some of the worlds only.
+            ValueError: `indices` does not name all worlds.
         """
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise ValueError(
@@ -134,14 +134,14 @@ class RigidVecEnv(VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Calls the method of the vector environment once; its result stands for each index."""
+        """Calls the method of the vector environment once; repeats its result for each index."""
         result = self._find(method_name)(*method_args, **method_kwargs)
         return [result] * len(list(self._get_indices(indices)))
 
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Whether the vector environment is wrapped in `wrapper_class`, once for each index."""
+        """Whether the vector environment is wrapped in `wrapper_class`, repeated for each index."""
         wrapped = any(isinstance(layer, wrapper_class) for layer in self._layers())
         return [wrapped] * len(list(self._get_indices(indices)))
 
@@ -153,14 +153,14 @@ class RigidVecEnv(VecEnv):
         return layers
 
     def _find(self, name: str) -> Any:
-        """The attribute of the outermost layer that has it: wrappers may override rewards."""
+        """The attribute of the outermost layer that has it, because wrappers override rewards."""
         for layer in self._layers():
             if hasattr(layer, name):
                 return getattr(layer, name)
         raise AttributeError(f"{self.envs} has no attribute {name!r}")
 
     def _shared_options(self) -> dict[str, Any] | None:
-        """The options of the next reset, which are of all worlds or of none."""
+        """The options of the next reset, which must be the same for all worlds."""
         first = self._options[0]
         if any(options is not first and options != first for options in self._options):
             raise ValueError("options differ between worlds, should be the same for all")
@@ -172,7 +172,7 @@ def _copied(observation: Observation) -> Observation:
 
 
 def _info_per_world(infos: dict[str, Any], worlds: np.ndarray) -> list[dict[str, Any]]:
-    """The infos of some worlds, one dict each, from arrays over all worlds."""
+    """The infos of the given worlds, one dict each, from arrays over all worlds."""
     keys = [
         key
         for key, value in infos.items()

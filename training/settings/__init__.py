@@ -1,1 +1,1 @@
-"""Settings of training runs, read from YAML and flags, and checked."""
+"""Settings of training runs: read from YAML and command-line flags, and validated."""

@@ -1,25 +1,29 @@
-"""Environments by id, with errors that say which id or argument was wrong."""
+"""Makes environments by id, with error messages that name a wrong id or argument."""
 
+import inspect
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from rigid_envs.wrappers import vector
-from training.settings.config import TrainConfig
 from training.settings.errors import UsageError, nearest
-from training.settings.settings import calls_of
+from training.settings.settings import parse_wrappers
+
+if TYPE_CHECKING:  # at run time it would import yaml, which reading a policy does not need
+    from training.settings.config import TrainConfig
 
 Made = TypeVar("Made")
 
 
 def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorEnv:
-    """The native vector environment, which resets ended worlds within the step.
+    """The native vector environment with autoreset mode SAME_STEP.
 
     Raises:
-        UsageError: The id is unknown or the environment refuses an argument.
+        UsageError: The id is unknown, or the environment rejects an argument.
     """
     return _make(
         env_id,
@@ -34,19 +38,19 @@ def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorE
     )
 
 
-def make_training_env(config: TrainConfig, env_kwargs: dict[str, Any]) -> VectorEnv:
-    """The vector environment in the configured reward wrappers.
+def make_training_env(config: "TrainConfig", env_kwargs: dict[str, Any]) -> VectorEnv:
+    """The vector environment in the reward wrappers of `config`.
 
     Raises:
-        UsageError: As `make_vector_env`; a wrapper refuses its arguments.
+        UsageError: As `make_vector_env`, or a wrapper rejects its arguments.
     """
     envs = make_vector_env(config.env_id, config.n_envs, **env_kwargs)
-    for name, arguments in calls_of(config.env_wrapper):
+    for name, arguments in parse_wrappers(config.env_wrapper):
         try:
             envs = getattr(vector, name.rpartition(".")[2])(envs, **arguments)
         except (TypeError, ValueError) as error:
             envs.close()
-            raise UsageError(f"env_wrapper {name} refuses {arguments}: {error}") from error
+            raise UsageError(f"env_wrapper: {name} rejects {arguments}: {error}") from error
     return envs
 
 
@@ -54,23 +58,66 @@ def make_single_env(env_id: str, /, **env_kwargs: Any) -> gym.Env:
     """The single environment.
 
     Raises:
-        UsageError: The id is unknown or the environment refuses an argument.
+        UsageError: The id is unknown, or the environment rejects an argument.
     """
     return _make(env_id, env_kwargs, lambda: gym.make(env_id, **env_kwargs))
 
 
+def effective_fidelity(env_id: str, env_kwargs: dict[str, Any]) -> Any:
+    """The fidelity that an environment uses: the argument, or the default of its constructor.
+
+    None for an environment without such an argument.
+    """
+    spec = _spec(env_id)
+    arguments = {**spec.kwargs, **env_kwargs}
+    if "fidelity" in arguments:
+        return arguments["fidelity"]
+    entry_point = spec.vector_entry_point
+    creator = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
+    parameter = inspect.signature(creator).parameters.get("fidelity") if creator else None
+    return parameter.default if parameter else None
+
+
+def task_of(env_id: str) -> str | None:
+    """Name of the task that an id was registered with, as "push"; None if without a name.
+
+    Raises:
+        UsageError: The id is unknown.
+    """
+    task = _spec(env_id).kwargs.get("task")
+    return task if isinstance(task, str) else None
+
+
+def registered_arguments(env_id: str) -> dict[str, Any]:
+    """The arguments that an id sets itself, except its task: reward_type of a dense id.
+
+    Raises:
+        UsageError: The id is unknown.
+    """
+    return {name: value for name, value in _spec(env_id).kwargs.items() if name != "task"}
+
+
 def _make(env_id: str, env_kwargs: dict[str, Any], make: Callable[[], Made]) -> Made:
-    try:
-        gym.spec(env_id)
-    except (gym.error.Error, ImportError):
-        # Ours first: someone who types no namespace means one of them.
-        ours = [name for name in gym.registry if name.startswith("RigidEnvs/")]
-        raise UsageError(
-            f"unknown environment {env_id!r}; "
-            f"did you mean {nearest(env_id, ours or gym.registry)!r}?"
-        ) from None
+    _spec(env_id)
     try:
         return make()
+    # Gymnasium checks some arguments by assert
     except (TypeError, ValueError, AssertionError, gym.error.Error) as error:
-        # Gymnasium asserts some of what it is given
-        raise UsageError(f"{env_id} refuses {env_kwargs}: {error}") from error
+        raise UsageError(f"{env_id} rejects {env_kwargs}: {error}") from error
+
+
+def _spec(env_id: str) -> Any:
+    """The registered specification.
+
+    Raises:
+        UsageError: The id is unknown.
+    """
+    try:
+        return gym.spec(env_id)
+    except (gym.error.Error, ImportError):
+        # this project's ids first: without a namespace, one of them is meant
+        own = [name for name in gym.registry if name.startswith("RigidEnvs/")]
+        raise UsageError(
+            f"unknown environment {env_id!r}; "
+            f"did you mean {nearest(env_id, own or gym.registry)!r}?"
+        ) from None

@@ -1,18 +1,31 @@
-"""Mistakes of the user, told in one line."""
+"""Mistakes of the user, reported in one line."""
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class UsageError(ValueError):
-    """What the user asked for cannot be done; the message says what would be right.
+    """The request cannot be carried out; the message says how to correct it.
 
-    The command line prints it without a traceback. Any other exception is a defect of ours.
+    The command line prints the message without a traceback. Any other exception is a bug of this
+    project.
     """
 
 
-def nearest(word: str, valid: Iterable[str]) -> str:
-    """The valid name most like `word`, in whatever case, for "did you mean"."""
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """The valid name most similar to `name`, ignoring case, for "did you mean"."""
     names = list(valid)
-    lower = [name.lower() for name in names]
-    return names[lower.index(difflib.get_close_matches(word.lower(), lower, n=1, cutoff=0.0)[0])]
+    lower = [valid_name.lower() for valid_name in names]
+    return names[lower.index(difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.0)[0])]
+
+
+def check_exists(path: Path, expected: str) -> None:
+    """Raises UsageError if there is nothing at `path`; all commands use this wording.
+
+    Args:
+        path: A file or folder that the user named.
+        expected: What should be there, as in "a run folder".
+    """
+    if not path.exists():
+        raise UsageError(f"{path} does not exist; it should be {expected}")

@@ -1,4 +1,4 @@
-"""What is searched when settings are tuned: a table an algorithm, and how its rows are drawn."""
+"""The settings that `rigid-envs tune` searches: a table for each algorithm, and its sampling."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,41 +9,41 @@ from training.settings.config import TrainConfig
 
 
 @dataclass(frozen=True)
-class Real:
-    """A number from low to high, as likely in each power of ten."""
+class LogUniform:
+    """A number from low to high, drawn uniformly on a logarithmic scale."""
 
     low: float
     high: float
 
     def draw(self, trial: optuna.Trial, name: str) -> float:
-        """A value."""
+        """Samples a value."""
         return trial.suggest_float(name, self.low, self.high, log=True)
 
 
 @dataclass(frozen=True)
 class OneOf:
-    """One of some values."""
+    """One of the values."""
 
     values: tuple[float | str, ...]
 
     def draw(self, trial: optuna.Trial, name: str) -> Any:
-        """A value."""
+        """Samples a value."""
         return trial.suggest_categorical(name, self.values)
 
 
-SPACES: dict[str, dict[str, Real | OneOf]] = {
+SPACES: dict[str, dict[str, LogUniform | OneOf]] = {
     "ppo": {
-        "learning_rate": Real(1e-4, 5e-3),
+        "learning_rate": LogUniform(1e-4, 5e-3),
         "gamma": OneOf((0.9, 0.93, 0.95, 0.97, 0.98, 0.99)),
         "n_steps": OneOf((10, 25, 50, 100)),
-        "minibatches": OneOf((4, 8, 16, 32)),  # of an update: n_envs × n_steps / batch_size
+        "minibatches": OneOf((4, 8, 16, 32)),  # per update: n_envs × n_steps / batch_size
         "n_epochs": OneOf((2, 4, 8, 16)),
-        "ent_coef": Real(1e-6, 1e-2),
+        "ent_coef": LogUniform(1e-6, 1e-2),
         "clip_range": OneOf((0.1, 0.2, 0.3, 0.4)),
         "net_arch": OneOf(("64 64", "128 128", "256 256", "64 64 64")),
     },
     "sac": {
-        "learning_rate": Real(1e-4, 3e-3),
+        "learning_rate": LogUniform(1e-4, 3e-3),
         "gamma": OneOf((0.9, 0.93, 0.95, 0.97, 0.98, 0.99)),
         "batch_size": OneOf((128, 256, 512, 1024)),
         "tau": OneOf((0.005, 0.01, 0.02, 0.05, 0.08)),
@@ -56,19 +56,19 @@ SPACES: dict[str, dict[str, Real | OneOf]] = {
 
 
 def draw(algo: str, trial: optuna.Trial) -> dict[str, Any]:
-    """A value of each row of an algorithm's table."""
+    """Samples a value for each row of an algorithm's table."""
     return {name: row.draw(trial, name) for name, row in SPACES[algo].items()}
 
 
 def with_drawn(config: TrainConfig, drawn: dict[str, Any]) -> TrainConfig:
-    """The settings, with drawn values in their place.
+    """Replaces settings by sampled values.
 
     Args:
-        config: Settings that the others are taken from.
-        drawn: Values by the names of the table.
+        config: The settings to start from.
+        drawn: Values by the names of the table, see `draw`.
 
     Raises:
-        UsageError: A value is none that the settings take.
+        UsageError: A value is not valid for its setting.
     """
     changes = dict(drawn)
     widths = [int(width) for width in changes.pop("net_arch").split()]

@@ -1,4 +1,4 @@
-"""What a value in a configuration file may be: rules that read it or say what would be right."""
+"""Rules for single values of a settings file: each returns the checked value or raises an error."""
 
 import dataclasses
 import math
@@ -9,11 +9,11 @@ from typing import Any
 from training.settings.errors import nearest
 
 Rule = Callable[[Any], Any]
-"""Takes the value as YAML gave it, returns it as the setting, or raises `Unfit`."""
+"""Takes a value as YAML parsed it and returns the setting, or raises `InvalidValue`."""
 
 
-class Unfit(ValueError):
-    """A value that a rule does not accept; the message says what would be right."""
+class InvalidValue(ValueError):
+    """A rule rejects a value; the message describes valid values and completes "should be"."""
 
 
 def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
@@ -24,15 +24,15 @@ def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
 
 
 def integer(at_least: int) -> Rule:
-    """An integer of at least `at_least`; 1e6, which YAML reads as a float, counts as one."""
+    """An integer of at least `at_least`; 1e6, which YAML parses as a float, is accepted."""
 
-    def read(value: Any) -> int:
+    def check(value: Any) -> int:
         whole = _is_number(value) and float(value).is_integer()
         if not whole or value < at_least:
-            raise Unfit(f"an integer of at least {at_least}")
+            raise InvalidValue(f"an integer of at least {at_least}")
         return int(value)
 
-    return read
+    return check
 
 
 def number(
@@ -41,151 +41,151 @@ def number(
     """A finite number within the bounds."""
     bounds = [
         f"{word} {bound:g}"
-        for word, bound in (("above", above), ("at least", at_least), ("at most", at_most))
+        for word, bound in (("above", above), ("of at least", at_least), ("at most", at_most))
         if math.isfinite(bound)
     ]
 
-    def read(value: Any) -> float:
-        fits = _is_number(value) and above < value and at_least <= value <= at_most
-        if not fits:
-            hint = " (YAML reads 3e-4 as text: write 3.0e-4)" if _looks_like_number(value) else ""
-            raise Unfit(" ".join(["a number", " and ".join(bounds)]).strip() + hint)
+    def check(value: Any) -> float:
+        valid = _is_number(value) and above < value and at_least <= value <= at_most
+        if not valid:
+            hint = " (YAML parses 3e-4 as text: write 3.0e-4)" if _looks_like_number(value) else ""
+            raise InvalidValue(" ".join(["a number", " and ".join(bounds)]).strip() + hint)
         return float(value)
 
-    return read
+    return check
 
 
 def schedule(at_least: float = 0.0) -> Rule:
-    """A positive number, or "lin_3e-4": the same number falling linearly to zero."""
+    """A positive number, or "lin_3e-4": a value that falls linearly from 3e-4 to zero."""
     positive = number(above=at_least)
 
-    def read(value: Any) -> float | str:
+    def check(value: Any) -> float | str:
         if isinstance(value, str) and value.startswith("lin_"):
             try:
                 positive(float(value.removeprefix("lin_")))
             except ValueError:
-                raise Unfit('"lin_" and a number above 0, as in "lin_3e-4"') from None
+                raise InvalidValue('"lin_" and a number above 0, as in "lin_3e-4"') from None
             return value
         try:
             return float(positive(value))
-        except Unfit as error:
-            raise Unfit(f'{error}, or as in "lin_3e-4"') from None
+        except InvalidValue as error:
+            raise InvalidValue(f'{error}, or as in "lin_3e-4"') from None
 
-    return read
+    return check
 
 
 def entropy_coefficient(value: Any) -> float | str:
-    """A number of at least 0, or "auto" or "auto_0.1" (learned, from that start)."""
+    """A number of at least 0; or "auto" or "auto_0.1" to learn it, the latter starting at 0.1."""
     if value == "auto":
         return "auto"
     if isinstance(value, str) and value.startswith("auto_") and _looks_like_number(value[5:]):
         return value
     try:
         return float(number(at_least=0.0)(value))
-    except Unfit as error:
-        raise Unfit(f'{error}, "auto", or as in "auto_0.1"') from None
+    except InvalidValue as error:
+        raise InvalidValue(f'{error}, "auto", or as in "auto_0.1"') from None
 
 
-def flag(value: Any) -> bool:
+def boolean(value: Any) -> bool:
     """True or false."""
     if not isinstance(value, bool):
-        raise Unfit("true or false")
+        raise InvalidValue("true or false")
     return value
 
 
 def choice(*options: str) -> Rule:
     """One of the options."""
 
-    def read(value: Any) -> str:
+    def check(value: Any) -> str:
         if not isinstance(value, str) or value not in options:
             hint = f"; did you mean {nearest(value, options)!r}?" if isinstance(value, str) else ""
-            raise Unfit(f"one of {', '.join(options)}{hint}")
+            raise InvalidValue(f"one of {', '.join(options)}{hint}")
         return value
 
-    return read
+    return check
 
 
 def optional(rule: Rule) -> Rule:
-    """What `rule` accepts, or null."""
+    """A value that `rule` accepts, or null."""
 
-    def read(value: Any) -> Any:
+    def check(value: Any) -> Any:
         if value is None:
             return None
         try:
             return rule(value)
-        except Unfit as error:
-            raise Unfit(f"{error}, or null") from None
+        except InvalidValue as error:
+            raise InvalidValue(f"{error}, or null") from None
 
-    return read
+    return check
 
 
-def widths(value: Any) -> list[int]:
-    """Sizes of hidden layers, as in [64, 64]."""
+def layer_widths(value: Any) -> list[int]:
+    """Widths of the hidden layers, as in [64, 64]."""
     try:
-        return [integer(1)(width) for width in _expect(list, value)]
-    except Unfit:
-        raise Unfit("a list of layer widths, as in [64, 64]") from None
+        return [integer(1)(width) for width in _check_type(list, value)]
+    except InvalidValue:
+        raise InvalidValue("a list of layer widths, as in [64, 64]") from None
 
 
 def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
-    """A mapping with text keys; given `keys`, only those, each under its own rule."""
+    """A mapping with text keys; with `keys`, only those are valid, each value under its rule."""
 
-    def read(value: Any) -> dict[str, Any]:
-        entries = _expect(dict, value)
+    def check(value: Any) -> dict[str, Any]:
+        entries = _check_type(dict, value)
         for key in entries:
             if not isinstance(key, str):
-                raise Unfit(f"a mapping whose keys are text, not {key!r}")
+                raise InvalidValue(f"a mapping whose keys are text, not {key!r}")
             if keys is not None and key not in keys:
-                raise Unfit(
+                raise InvalidValue(
                     f"a mapping of {', '.join(keys)}; "
-                    f"did you mean {nearest(key, keys)!r} for {key!r}?"
+                    f"did you mean {nearest(key, keys)!r} instead of {key!r}?"
                 )
         if keys is None:
             return dict(entries)
-        return {key: _nested(key, keys[key], entry) for key, entry in entries.items()}
+        return {key: _check_entry(key, keys[key], entry) for key, entry in entries.items()}
 
-    return read
+    return check
 
 
-def named_calls(*names: str) -> Rule:
-    """A name, {name: {argument: value}} or a list of either, as the zoo writes wrappers."""
+def wrapper_list(*names: str) -> Rule:
+    """NAME, {NAME: {argument: value}} or a list of either: rl-baselines3-zoo's wrapper syntax."""
 
-    def read(value: Any) -> Any:
+    def check(value: Any) -> Any:
         for entry in value if isinstance(value, list) else [value]:
             one = {entry: {}} if isinstance(entry, str) else entry
             if not isinstance(one, dict) or len(one) != 1:
-                raise Unfit("NAME, {NAME: {argument: value}} or a list of either")
+                raise InvalidValue("NAME, {NAME: {argument: value}} or a list of either")
             for name, arguments in one.items():
                 choice(*names)(name)
-                _nested(name, mapping(), arguments)
+                _check_entry(name, mapping(), arguments)
         return value
 
-    return read
+    return check
 
 
-def calls_of(value: Any) -> list[tuple[str, dict[str, Any]]]:
-    """Names and arguments of what `named_calls` accepts, in order; none of None."""
+def parse_wrappers(value: Any) -> list[tuple[str, dict[str, Any]]]:
+    """Names and arguments from a value that `wrapper_list` accepts, in order; [] for None."""
     if value is None:
         return []
     entries = value if isinstance(value, list) else [value]
     return [(one, {}) if isinstance(one, str) else next(iter(one.items())) for one in entries]
 
 
-def _nested(key: str, rule: Rule, value: Any) -> Any:
+def _check_entry(key: str, rule: Rule, value: Any) -> Any:
     try:
         return rule(value)
-    except Unfit as error:
-        raise Unfit(f"{key} to be {error}") from None
+    except InvalidValue as error:
+        raise InvalidValue(f"a mapping in which {key} is {error}") from None
 
 
-def _expect(kind: type, value: Any) -> Any:
+def _check_type(kind: type, value: Any) -> Any:
     if not isinstance(value, kind):
-        raise Unfit("a mapping, as in {key: value}" if kind is dict else "a list")
+        raise InvalidValue("a mapping, as in {key: value}" if kind is dict else "a list")
     return value
 
 
 def _is_number(value: Any) -> bool:
-    """True for a finite int or float; a bool is no number, nor is what no float can hold."""
+    """True for a finite int or float; False for a bool and for integers too large for a float."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return False
     return abs(value) <= sys.float_info.max

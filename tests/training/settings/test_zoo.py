@@ -1,6 +1,6 @@
-"""rl-baselines3-zoo takes our settings as they are: by its own reader, down to the model.
+"""rl-baselines3-zoo reads the packaged settings with its own reader and builds models from them.
 
-In a process of its own, for importing the zoo changes Gymnasium's TimeLimit for all who share it.
+It runs in a separate process, because importing it changes Gymnasium's TimeLimit.
 """
 
 import json
@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 import yaml
 
-from training.settings.config import ALGORITHMS, PACKAGED, load_config, packaged_environments
+from training.settings.config import ALGORITHMS
+from training.settings.config_file import CONFIG_FOLDER, load_config, packaged_environments
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ZOO = """
 import json, sys
 from argparse import Namespace
@@ -48,12 +49,15 @@ print()
 print(json.dumps(found))
 """
 
-needs_zoo = pytest.mark.skipif(find_spec("rl_zoo3") is None, reason="rl_zoo3 is not installed")
+pytestmark = [
+    pytest.mark.packaging,
+    pytest.mark.skipif(find_spec("rl_zoo3") is None, reason="rl_zoo3 is not installed"),
+]
 
 
-def read_by_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
-    """By environment: settings as the zoo understands them, and what became of them."""
-    file = PACKAGED / f"{algo}.yaml"
+def read_with_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
+    """By environment: the settings as the zoo reads them, and properties of the model."""
+    file = CONFIG_FOLDER / f"{algo}.yaml"
     result = subprocess.run(
         [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *packaged_environments(algo)],
         cwd=ROOT,
@@ -65,17 +69,16 @@ def read_by_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
     return found
 
 
-@needs_zoo
 @pytest.mark.parametrize("algo", ALGORITHMS)
-def test_the_zoo_reads_what_we_read_and_makes_a_model_of_it(algo, tmp_path):
-    for env_id, found in read_by_the_zoo(algo, tmp_path).items():
-        ours = load_config(algo, env_id).as_mapping()
+def test_zoo_reads_the_same_settings_and_builds_a_model(algo, tmp_path):
+    for env_id, found in read_with_the_zoo(algo, tmp_path).items():
+        own = load_config(algo, env_id).as_mapping()
         theirs = found["settings"]
-        assert theirs == {name: ours[name] for name in theirs}
-        # all that decides a run: what is left out is what is by default
-        written = yaml.safe_load((PACKAGED / f"{algo}.yaml").read_text())[env_id]
+        assert theirs == {name: own[name] for name in theirs}
+        # the zoo reads every setting that the file has
+        written = yaml.safe_load((CONFIG_FOLDER / f"{algo}.yaml").read_text())[env_id]
         assert set(theirs) == (set(written) | {"normalize"}) - {"env_wrapper"}
-        wrapper = ours["env_wrapper"]
+        wrapper = own["env_wrapper"]
         assert found["env_wrapper"] == (wrapper is not None)
-        assert found["gamma"] == ours["gamma"]
+        assert found["gamma"] == own["gamma"]
         assert found["net_arch"] is not None

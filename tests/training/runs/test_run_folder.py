@@ -1,3 +1,5 @@
+"""Run folders: never reused, with a record of how the run was started."""
+
 import json
 import subprocess
 
@@ -6,22 +8,22 @@ import pytest
 from training.runs import run_folder
 from training.runs.run_folder import (
     RunFolder,
+    atomic_write,
     create_run_folder,
     git_commit,
     latest_run,
-    written_whole,
 )
-from training.settings.config import load_config
+from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 
 
-def test_each_run_gets_a_folder_of_its_own(tmp_path, quick_ppo):
+def test_each_run_gets_a_new_folder(tmp_path, quick_ppo):
     paths = [create_run_folder(tmp_path, quick_ppo).path for _ in range(3)]
     assert [path.name for path in paths] == [f"Test-Reach-v0_{n}" for n in (1, 2, 3)]
     assert {path.parent for path in paths} == {tmp_path / "ppo"}
 
 
-def test_numbers_of_deleted_runs_in_between_are_not_used_again(tmp_path, quick_ppo):
+def test_numbers_of_deleted_runs_are_not_reused(tmp_path, quick_ppo):
     first = create_run_folder(tmp_path, quick_ppo).path
     create_run_folder(tmp_path, quick_ppo)
     for file in first.iterdir():
@@ -30,7 +32,7 @@ def test_numbers_of_deleted_runs_in_between_are_not_used_again(tmp_path, quick_p
     assert create_run_folder(tmp_path, quick_ppo).path.name == "Test-Reach-v0_3"
 
 
-def test_a_folder_that_appears_at_the_same_time_is_left_alone(tmp_path, quick_ppo, monkeypatch):
+def test_folder_created_by_another_process_is_not_changed(tmp_path, quick_ppo, monkeypatch):
     taken = create_run_folder(tmp_path, quick_ppo)
     before = taken.path.joinpath("config.yaml").read_bytes()
     monkeypatch.setattr(run_folder, "_runs", lambda *_: [])
@@ -39,7 +41,7 @@ def test_a_folder_that_appears_at_the_same_time_is_left_alone(tmp_path, quick_pp
     assert taken.path.joinpath("config.yaml").read_bytes() == before
 
 
-def test_the_folder_says_what_made_the_run(tmp_path, quick_ppo):
+def test_folder_records_how_the_run_was_started(tmp_path, quick_ppo):
     folder = create_run_folder(tmp_path, quick_ppo)
     assert load_config("ppo", "Test/Reach-v0", folder.path / "config.yaml") == quick_ppo
     assert folder.config() == quick_ppo
@@ -54,13 +56,13 @@ def test_the_folder_says_what_made_the_run(tmp_path, quick_ppo):
     assert "rigid-envs" in versions
 
 
-def test_the_commit_tells_of_changes_since(tmp_path, monkeypatch):
+def test_commit_is_marked_dirty_after_changes(tmp_path, monkeypatch):
     def git(*words):
         who = ["-c", "user.name=Ada", "-c", "user.email=ada@example.org"]
         subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True, capture_output=True)
 
-    source = tmp_path / "training" / "run_folder.py"
-    source.parent.mkdir()
+    source = tmp_path / "training" / "runs" / "run_folder.py"
+    source.parent.mkdir(parents=True)
     source.write_text("")
     monkeypatch.setattr(run_folder, "__file__", str(source))
     assert git_commit() is None
@@ -81,35 +83,35 @@ def test_latest_run_is_the_one_with_the_highest_number(tmp_path, quick_ppo):
     assert latest_run(tmp_path, "ppo", "Test/Reach-v0") == newest
 
 
-def test_no_run_yet_says_how_to_make_one(tmp_path):
+def test_missing_run_suggests_the_command(tmp_path):
     with pytest.raises(UsageError, match="rigid-envs train --algo ppo --env Test/Reach-v0"):
         latest_run(tmp_path, "ppo", "Test/Reach-v0")
 
 
-def test_log_folder_that_is_a_file_is_named(tmp_path, quick_ppo):
+def test_log_folder_that_is_a_file_raises(tmp_path, quick_ppo):
     file = tmp_path / "runs"
     file.write_text("")
     with pytest.raises(UsageError, match="runs"):
         create_run_folder(file, quick_ppo)
     (tmp_path / "ppo").write_text("")
-    with pytest.raises(UsageError, match=r"cannot make a folder in .*ppo"):
+    with pytest.raises(UsageError, match=r"cannot create a folder in .*ppo"):
         create_run_folder(tmp_path, quick_ppo)
 
 
-def test_other_folders_are_no_runs(tmp_path):
-    with pytest.raises(UsageError, match=r"run\.json is missing"):
+def test_other_folders_raise(tmp_path):
+    with pytest.raises(UsageError, match=r"is not a run folder: run\.json is missing"):
         RunFolder(tmp_path).config()
     (tmp_path / "run.json").write_text("{}")
     with pytest.raises(UsageError, match=r"run\.json is damaged"):
         RunFolder(tmp_path).config()
 
 
-def test_failed_write_leaves_the_file_before_whole(tmp_path):
+def test_failed_write_keeps_the_previous_file(tmp_path):
     path = tmp_path / "model.zip"
     path.write_bytes(b"before")
 
     def write_half() -> None:
-        with written_whole(path) as file:
+        with atomic_write(path) as file:
             file.write(b"half")
             raise OSError("disk full")
 

@@ -1,4 +1,4 @@
-"""Each trap between Gymnasium's vector environments and Stable-Baselines3's, one claim each."""
+"""RigidVecEnv: one test for each difference between the interfaces of Gymnasium and SB3."""
 
 import copy
 
@@ -25,7 +25,7 @@ def still(env) -> np.ndarray:
 
 
 def run_to_the_end(env, steps: int = 10):
-    """Steps with zero actions; returns what the last step returned."""
+    """Steps with zero actions; returns the outcome of the last step."""
     for _ in range(steps):
         outcome = env.step(still(env))
     return outcome
@@ -38,7 +38,7 @@ def test_spaces_are_those_of_one_world():
     assert env.num_envs == WORLDS
 
 
-def test_other_autoreset_modes_are_refused():
+def test_other_autoreset_modes_raise():
     with pytest.raises(ValueError, match=r"autoreset_mode is .*should be .*SAME_STEP"):
         make(autoreset_mode=AutoresetMode.NEXT_STEP)
 
@@ -48,7 +48,7 @@ def test_dones_are_terminated_or_truncated():
     observation = env.reset()
     ended_by_success = ended_by_time = 0
     for _ in range(12):
-        # Worlds 0 to 2 go for the goal, the others stay.
+        # worlds 0 to 2 move to the goal, the others do not move
         actions = straight_to_the_goal(observation)
         actions[3:] = 0
         observation, _, dones, infos = env.step(actions)
@@ -66,7 +66,7 @@ def test_time_limit_is_truncated_and_not_terminated():
     env = make(max_episode_steps=1, terminate_on_success=True)
     env.seed(0)
     env.reset()
-    # World 0 stands on its goal at its last step: both terminated and truncated.
+    # world 0 is at its goal in the last step: both terminated and truncated
     env.envs.buffer["desired_goal"][0] = 0
     _, _, dones, infos = env.step(still(env))
     assert dones.all()
@@ -74,7 +74,7 @@ def test_time_limit_is_truncated_and_not_terminated():
     assert [info["TimeLimit.truncated"] for info in infos[1:]] == [True] * (WORLDS - 1)
 
 
-def test_terminal_observation_is_of_the_episode_that_ended():
+def test_terminal_observation_is_that_of_the_ended_episode():
     env = make()
     observation = env.reset()
     goals = observation["desired_goal"].copy()
@@ -106,19 +106,19 @@ def test_terminal_observation_is_a_copy():
 def test_observations_and_rewards_are_not_overwritten_by_later_steps():
     env = make(reward_type="dense")
     first = env.reset()
-    kept = copy.deepcopy(first)
+    first_copy = copy.deepcopy(first)
     second, rewards, dones, _ = env.step(np.ones((WORLDS, 2), np.float32))
-    kept_second, kept_rewards, kept_dones = copy.deepcopy((second, rewards, dones))
+    second_copy, rewards_copy, dones_copy = copy.deepcopy((second, rewards, dones))
     run_to_the_end(env, 20)
-    for key in kept:
-        np.testing.assert_array_equal(first[key], kept[key])
-        np.testing.assert_array_equal(second[key], kept_second[key])
-    np.testing.assert_array_equal(rewards, kept_rewards)
-    np.testing.assert_array_equal(dones, kept_dones)
+    for key in first_copy:
+        np.testing.assert_array_equal(first[key], first_copy[key])
+        np.testing.assert_array_equal(second[key], second_copy[key])
+    np.testing.assert_array_equal(rewards, rewards_copy)
+    np.testing.assert_array_equal(dones, dones_copy)
     assert rewards.dtype == np.float32
 
 
-def test_writing_into_an_observation_does_not_reach_the_environment():
+def test_writing_to_an_observation_does_not_change_the_environment():
     env = make()
     observation = env.reset()
     observation["achieved_goal"][:] = 5
@@ -126,7 +126,7 @@ def test_writing_into_an_observation_does_not_reach_the_environment():
     np.testing.assert_array_equal(observation["achieved_goal"], 0)
 
 
-def test_worlds_that_go_on_share_one_empty_info():
+def test_worlds_whose_episode_continues_share_one_empty_info():
     env = make(stagger=4)
     env.reset()
     _, _, dones, infos = run_to_the_end(env, 2)
@@ -136,7 +136,7 @@ def test_worlds_that_go_on_share_one_empty_info():
     assert infos[0] is not infos[2]
 
 
-def test_info_at_the_end_holds_success_and_other_terms_of_the_last_step():
+def test_info_at_the_end_contains_success_and_terms_of_the_last_step():
     env = make(reward_type="dense")
     observation = env.reset()
     for _ in range(10):
@@ -148,7 +148,7 @@ def test_info_at_the_end_holds_success_and_other_terms_of_the_last_step():
         assert not any(key.startswith("_") for key in info)
 
 
-def test_reset_infos_are_one_dict_a_world_and_follow_autoreset():
+def test_reset_infos_are_one_dict_per_world_and_follow_autoreset():
     env = make(stagger=4)
     env.reset()
     assert env.reset_infos == [{"is_success": False, "episode_index": 0}] * WORLDS
@@ -156,7 +156,7 @@ def test_reset_infos_are_one_dict_a_world_and_follow_autoreset():
     assert [info["episode_index"] for info in env.reset_infos] == [0, 0, 1] * 2
 
 
-def test_env_is_wrapped_answers_for_each_world():
+def test_env_is_wrapped_returns_a_value_per_world():
     env = make()
     assert env.env_is_wrapped(Monitor) == [False] * WORLDS
     assert env.env_is_wrapped(Monitor, indices=[0, 2]) == [False, False]
@@ -164,7 +164,7 @@ def test_env_is_wrapped_answers_for_each_world():
     assert wrapped.env_is_wrapped(RecordEpisodeStatistics) == [True] * WORLDS
 
 
-def test_seed_makes_episodes_repeat_and_holds_for_one_reset():
+def test_seed_repeats_episodes_and_applies_to_one_reset():
     env = make()
     assert list(env.seed(5)) == [5 + world for world in range(WORLDS)]
     first = env.reset()["desired_goal"]
@@ -175,7 +175,7 @@ def test_seed_makes_episodes_repeat_and_holds_for_one_reset():
     assert not np.array_equal(first, unseeded)
 
 
-def test_seeds_of_worlds_follow_each_other():
+def test_seeds_of_worlds_are_consecutive():
     env = make()
     env.seed(5)
     first = env.reset()["desired_goal"]
@@ -192,20 +192,20 @@ def test_options_reach_the_environment_once():
     assert env.envs.received_options is None
 
 
-def test_options_that_differ_between_worlds_are_refused():
+def test_options_that_differ_between_worlds_raise():
     env = make()
     env.set_options([{"difficulty": world} for world in range(WORLDS)])
     with pytest.raises(ValueError, match="options differ between worlds"):
         env.reset()
 
 
-def test_compute_reward_is_called_once_and_answers_for_the_indices():
+def test_compute_reward_is_called_once_and_repeated_for_the_indices():
     env = make()
     achieved = np.zeros((3, 2), np.float32)
     desired = np.float32([[0, 0], [1, 0], [0, 0.1]])
-    answer = env.env_method("compute_reward", achieved, desired, [{}] * 3, indices=[0])
-    assert len(answer) == 1
-    np.testing.assert_array_equal(answer[0], [0, -1, 0])
+    result = env.env_method("compute_reward", achieved, desired, [{}] * 3, indices=[0])
+    assert len(result) == 1
+    np.testing.assert_array_equal(result[0], [0, -1, 0])
     assert len(env.env_method("compute_reward", achieved, desired, [{}] * 3)) == WORLDS
 
 
@@ -221,7 +221,7 @@ def test_compute_reward_is_that_of_the_outermost_wrapper():
     assert env.get_attr("fidelity", indices=[0]) == ["balanced"]
 
 
-def test_get_attr_and_set_attr_are_of_all_worlds():
+def test_get_attr_and_set_attr_apply_to_all_worlds():
     env = make()
     assert env.get_attr("fidelity") == ["balanced"] * WORLDS
     assert env.get_attr("fidelity", indices=3) == ["balanced"]
@@ -234,7 +234,7 @@ def test_get_attr_and_set_attr_are_of_all_worlds():
         env.get_attr("colour")
 
 
-def test_render_shows_the_environment_s_pictures():
+def test_render_returns_the_environment_s_frames():
     env = make(render_mode="rgb_array")
     env.reset()
     assert env.render_mode == "rgb_array"
@@ -261,7 +261,7 @@ def test_vec_monitor_reports_return_and_length():
             assert infos[world]["episode"]["r"] == -infos[world]["episode"]["l"]
             assert "terminal_observation" in infos[world]
     assert sorted(lengths) == [6, 6, 8, 8, 10, 10]
-    assert infos[1] == {}  # the shared info stays clean
+    assert infos[1] == {}  # the shared info is not changed
 
 
 def test_vec_normalize_scales_terminal_observations_once():

@@ -1,4 +1,4 @@
-"""Runs that end before their time go on from their last checkpoint, whatever ended them."""
+"""Interrupted runs resume from their last checkpoint, whatever interrupted them."""
 
 import csv
 import errno
@@ -19,6 +19,7 @@ from stable_baselines3.common.logger import CSVOutputFormat
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from training.commands import cli
+from training.commands.demo import print_training
 from training.policies.policy_file import load_policy_file, read_policy
 from training.results.plot import read_learning_curve
 from training.runs.run_folder import RunFolder
@@ -33,7 +34,7 @@ KILLED = """
 import sys
 from pathlib import Path
 import tests.training.conftest
-from training.settings.config import load_config
+from training.settings.config_file import load_config
 from training.sb3.train import train
 config = load_config(sys.argv[1], "Test/Reach-v0", Path(sys.argv[2]))
 train(config, Path(sys.argv[3]), save_every=1, quiet=True)
@@ -41,7 +42,7 @@ train(config, Path(sys.argv[3]), save_every=1, quiet=True)
 
 
 def stopping(monkeypatch, after: int, error: BaseException) -> None:
-    """Makes training fail once it has taken more than that many steps."""
+    """Makes training fail after more than the given number of steps."""
 
     class Stop(BaseCallback):
         def _on_step(self) -> bool:
@@ -53,7 +54,7 @@ def stopping(monkeypatch, after: int, error: BaseException) -> None:
 
 
 def with_stop(stop: type[BaseCallback]):
-    """The progress display, which fails too."""
+    """The progress display, with a callback that fails."""
 
     class Both(TrainingProgress):
         def _on_step(self) -> bool:
@@ -68,7 +69,7 @@ def steps_in_tensorboard(folder: RunFolder) -> list[int]:
 
 
 def steps_of(folder: RunFolder) -> list[int]:
-    """Steps of each row of the learning curve, of which each must have as many cells."""
+    """Steps of each row of the learning curve; all rows must have the same number of cells."""
     with folder.progress.open(newline="") as file:
         rows = list(csv.reader(file))
     assert {len(row) for row in rows} == {len(rows[0])}
@@ -86,7 +87,7 @@ def interrupted(config, tmp_path, monkeypatch, after, error=KeyboardInterrupt) -
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
 @pytest.mark.parametrize("normalize", [False, True])
-def test_ppo_goes_on_to_the_steps_it_was_made_for(
+def test_ppo_resumes_and_trains_for_the_remaining_steps(
     quick_ppo, tmp_path, monkeypatch, error, normalize
 ):
     config = quick_ppo.replace(n_timesteps=400, normalize=normalize, learning_rate="lin_1e-3")
@@ -95,10 +96,11 @@ def test_ppo_goes_on_to_the_steps_it_was_made_for(
     assert 0 < state["seconds_in_envs"] < state["seconds"]
     result = resume(folder, quiet=True)
     at_end = read_state(folder.checkpoint)
-    in_envs = result.environment_share * result.seconds
-    assert at_end["seconds_in_envs"] == pytest.approx(state["seconds_in_envs"] + in_envs)
-    assert at_end["seconds_in_envs"] < at_end["seconds"]
-    assert at_end["seconds"] >= state["seconds"] + result.seconds
+    # the result is that of the whole run, not of the resumed part
+    in_envs = result.environment_time_fraction * result.seconds
+    assert at_end["seconds_in_envs"] == pytest.approx(in_envs)
+    assert state["seconds_in_envs"] < at_end["seconds_in_envs"] < at_end["seconds"]
+    assert at_end["seconds"] >= result.seconds > state["seconds"]
     assert (result.steps, result.steps_before) == (400, 160)
     assert steps_of(folder) == [80, 160, 240, 320, 400]
     assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
@@ -108,41 +110,41 @@ def test_ppo_goes_on_to_the_steps_it_was_made_for(
     assert seconds == sorted(seconds)
     with folder.progress.open() as file:
         rates = [float(row["train/learning_rate"]) for row in list(csv.DictReader(file))[1:]]
-    assert rates == pytest.approx([8e-4, 6e-4, 4e-4, 2e-4])  # as if nothing had happened
+    assert rates == pytest.approx([8e-4, 6e-4, 4e-4, 2e-4])  # as in an uninterrupted run
     assert len(json.loads((folder.path / "run.json").read_text())["resumed"]) == 1
     assert len(folder.checkpoints()) == 1
 
 
-@pytest.mark.parametrize("hindsight", [True, False])
-def test_sac_goes_on_with_its_replay_buffer(quick_sac, tmp_path, monkeypatch, hindsight):
-    if not hindsight:
+@pytest.mark.parametrize("her", [True, False])
+def test_sac_resumes_with_its_replay_buffer(quick_sac, tmp_path, monkeypatch, her):
+    if not her:
         quick_sac = quick_sac.replace(replay_buffer_class=None, replay_buffer_kwargs={})
     config = quick_sac.replace(n_timesteps=400, buffer_size=200)
     folder = interrupted(config, tmp_path, monkeypatch, 240)
     models = []
     monkeypatch.setattr(train_module, "_learn", lambda model, *_: models.append(model))
     resume(folder)
-    with np.load(folder.checkpoint / "replay.npz") as kept:
-        assert kept["full"]
-        np.testing.assert_array_equal(models[0].replay_buffer.actions, kept["actions"])
+    with np.load(folder.checkpoint / "replay.npz") as saved:
+        assert saved["full"]
+        np.testing.assert_array_equal(models[0].replay_buffer.actions, saved["actions"])
     monkeypatch.undo()
     result = resume(folder, quiet=True)
-    # a rollout takes 8 steps, and Ctrl-C came after 4 of one
+    # a rollout has 8 steps, and Ctrl-C came after 4 of one
     assert result.steps == 404
     assert steps_of(folder) == sorted(set(steps_of(folder)))
 
 
-def test_a_model_is_restored_whole(quick_ppo, tmp_path, monkeypatch):
+def test_model_is_restored_completely(quick_ppo, tmp_path, monkeypatch):
     config = quick_ppo.replace(n_timesteps=400, normalize=True)
-    kept = []
+    saved = []
     save = checkpoint_module.state_files
     monkeypatch.setattr(
         checkpoint_module,
         "state_files",
-        lambda model, notes: kept.append((model, mean_of(model).copy())) or save(model, notes),
+        lambda model, notes: saved.append((model, mean_of(model).copy())) or save(model, notes),
     )
     folder = interrupted(config, tmp_path, monkeypatch, 200)
-    state, (before, mean) = read_state(folder.checkpoint), kept[-1]
+    state, (before, mean) = read_state(folder.checkpoint), saved[-1]
     found = []
     monkeypatch.setattr(train_module, "_learn", lambda model, *_: found.append(drawn(model)))
     for _ in range(2):
@@ -157,8 +159,8 @@ def test_a_model_is_restored_whole(quick_ppo, tmp_path, monkeypatch):
     moments = [
         list(one.policy.optimizer.state_dict()["state"][0].values()) for one in (model, before)
     ]
-    for ours, theirs in zip(*moments, strict=True):
-        torch.testing.assert_close(ours, theirs, rtol=0, atol=0)
+    for restored, expected in zip(*moments, strict=True):
+        torch.testing.assert_close(restored, expected, rtol=0, atol=0)
     np.testing.assert_array_equal(found[0][1], mean)
 
 
@@ -167,7 +169,7 @@ def mean_of(model) -> np.ndarray:
 
 
 def drawn(model) -> tuple:
-    """The model, its statistics, and the next number of each generator."""
+    """The model, its statistics, and the next number of each random generator."""
     mean = mean_of(model).copy()
     numbers = (random.random(), np.random.random(), float(torch.rand(1)))  # noqa: NPY002
     first = model.env.reset()["desired_goal"][0, 0]
@@ -175,15 +177,13 @@ def drawn(model) -> tuple:
 
 
 @pytest.mark.parametrize("algo", ["ppo", "sac"])
-def test_a_run_that_is_killed_at_any_moment_goes_on(
-    algo, quick_ppo, quick_sac, tmp_path, write_yaml
-):
+def test_run_killed_at_any_moment_can_be_resumed(algo, quick_ppo, quick_sac, tmp_path, write_yaml):
     config = {"ppo": quick_ppo, "sac": quick_sac}[algo].replace(n_timesteps=1_000_000)
     settings = write_yaml(config.as_yaml())
     folder = RunFolder(tmp_path / algo / "Test-Reach-v0_1")
     process = subprocess.Popen(
         [sys.executable, "-c", KILLED, algo, str(settings), str(tmp_path)],
-        cwd=Path(__file__).parents[2],
+        cwd=Path(__file__).parents[3],
     )
     rng = random.Random(algo)
     try:
@@ -192,9 +192,9 @@ def test_a_run_that_is_killed_at_any_moment_goes_on(
             assert process.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        with pytest.raises(UsageError, match="is being trained by another process"):
+        with pytest.raises(UsageError, match="another process is training"):
             resume(folder)
-        for _ in range(10):  # what a kill at each of these moments would leave behind
+        for _ in range(10):  # the files that a kill at each of these moments would leave
             process.send_signal(signal.SIGSTOP)
             os.waitpid(process.pid, os.WUNTRACED)  # until it has stopped
             state = read_state(folder.checkpoint)
@@ -204,7 +204,7 @@ def test_a_run_that_is_killed_at_any_moment_goes_on(
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
-    # as many steps are left as take a moment
+    # few remaining steps, so that the test is short
     steps = read_state(folder.checkpoint)["steps"]
     shorter = folder.config().replace(n_timesteps=steps + 160)
     (folder.path / "config.yaml").write_text(shorter.as_yaml())
@@ -220,7 +220,7 @@ def full_disk(*_args, **_kwargs):
 
 
 @pytest.mark.parametrize("file", ["policy.policy", "tensors.pt", "model.zip", "progress.csv"])
-def test_a_full_disk_leaves_the_last_checkpoint_whole(quick_ppo, tmp_path, monkeypatch, file):
+def test_full_disk_leaves_the_last_checkpoint_intact(quick_ppo, tmp_path, monkeypatch, file):
     write, seen = checkpoint_module._write, []
 
     def write_until_full(path, content):
@@ -233,7 +233,7 @@ def test_a_full_disk_leaves_the_last_checkpoint_whole(quick_ppo, tmp_path, monke
     config = quick_ppo.replace(n_timesteps=400)
     with monkeypatch.context() as patched:
         patched.setattr(checkpoint_module, "_write", write_until_full)
-        with pytest.raises(UsageError, match="No space left on device; the one before is whole"):
+        with pytest.raises(UsageError, match="No space left on device; the previous one is intact"):
             train(config, tmp_path, save_every=1, quiet=True)
     folder = RunFolder(tmp_path / "ppo" / "Test-Reach-v0_1")
     assert [number for number, _ in folder.checkpoints()] == [1]
@@ -242,7 +242,7 @@ def test_a_full_disk_leaves_the_last_checkpoint_whole(quick_ppo, tmp_path, monke
     assert resume(folder, quiet=True).steps == 400
 
 
-def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path, monkeypatch):
+def test_full_disk_for_the_learning_curve_stops_training(quick_ppo, tmp_path, monkeypatch):
     write = CSVOutputFormat.write
 
     def write_until_full(self, values, excluded, step=0):
@@ -266,35 +266,38 @@ def test_a_full_disk_under_the_learning_curve_stops_training(quick_ppo, tmp_path
     assert steps_in_tensorboard(folder) == [80, 160, 240, 320, 400]
 
 
-def test_a_checkpoint_that_did_not_keep_the_environments_time_goes_on(
-    quick_ppo, tmp_path, monkeypatch
+def test_checkpoint_without_the_environments_time_can_be_resumed(
+    quick_ppo, tmp_path, monkeypatch, capsys
 ):
     folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
     state = read_state(folder.checkpoint)
     del state["seconds_in_envs"]
     (folder.checkpoint / "state.json").write_text(json.dumps(state))
-    resume(folder, quiet=True)
+    result = resume(folder, quiet=True)
     assert read_state(folder.checkpoint)["seconds_in_envs"] is None
+    assert result.environment_time_fraction is None
+    print_training(result)
+    assert "in the environments" not in capsys.readouterr().out
 
 
-def test_what_cannot_be_resumed_is_named(quick_ppo, tmp_path, monkeypatch):
-    with pytest.raises(UsageError, match=r"run\.json is missing"):
+def test_runs_that_cannot_be_resumed_raise(quick_ppo, tmp_path, monkeypatch):
+    with pytest.raises(UsageError, match="nothing does not exist; it should be a run folder"):
         resume(RunFolder(tmp_path / "nothing"))
     finished = train(quick_ppo, tmp_path, quiet=True).folder
-    with pytest.raises(UsageError, match="is finished, after 160 steps"):
+    with pytest.raises(UsageError, match="is finished after 160 steps"):
         resume(finished)
     config = quick_ppo.replace(n_timesteps=400)
     with monkeypatch.context() as patched:
         stopping(patched, 100, RuntimeError())
         with pytest.raises(RuntimeError):
             train(config, tmp_path, save_every=300, quiet=True)
-    with pytest.raises(UsageError, match="holds no checkpoint to resume from"):
+    with pytest.raises(UsageError, match="has no checkpoint: the run ended before the first one"):
         resume(RunFolder(tmp_path / "ppo" / "Test-Reach-v0_2"))
 
 
 @pytest.mark.parametrize("name", ["state.json", "tensors.pt"])
 @pytest.mark.parametrize("damage", ["missing", "cut", "foreign"])
-def test_damaged_checkpoints_are_named(quick_ppo, tmp_path, monkeypatch, name, damage):
+def test_damaged_checkpoint_raises(quick_ppo, tmp_path, monkeypatch, name, damage):
     folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
     file = folder.checkpoint / name
     content = file.read_bytes()
@@ -305,21 +308,25 @@ def test_damaged_checkpoints_are_named(quick_ppo, tmp_path, monkeypatch, name, d
         resume(folder)
 
 
-def test_the_command_resumes_and_refuses_what_contradicts(quick_ppo, tmp_path, monkeypatch, capsys):
+def test_command_resumes_and_rejects_contradictory_flags(quick_ppo, tmp_path, monkeypatch, capsys):
     folder = interrupted(quick_ppo.replace(n_timesteps=400), tmp_path, monkeypatch, 200)
     words = ["train", "--resume", str(folder.path)]
     for flags, message in (
         (["--algo", "sac"], "--algo is 'sac'"),
         (["--env", "RigidEnvs/Push-v0"], "--env is 'RigidEnvs/Push-v0'"),
-        (["--config", "other.yaml"], "--config does not go with --resume"),
-        (["--seed", "4"], "seed is asked to be 4, but"),
-        (["-n", "500"], "n_timesteps is asked to be 500"),
-        (["--hyperparams", "gamma:0.5"], "gamma is asked to be 0.5"),
-        (["--env-kwargs", "reward_type:sparse"], "env_kwargs is asked"),
-        (["--fidelity", "fast"], "env_kwargs is asked"),
+        (["--config", "other.yaml"], "--config cannot be used with --resume"),
+        (["--seed", "4"], "seed is 4, but"),
+        (["-n", "500"], "n_timesteps is 500, but"),
+        (["--hyperparams", "gamma:0.5"], "gamma is 0.5, but"),
+        (["--env-kwargs", "reward_type:sparse"], "env_kwargs is {"),
+        (["--fidelity", "fast"], "env_kwargs is {"),
     ):
         assert cli.main([*words, *flags]) == 2
         assert message in capsys.readouterr().err
     assert cli.main([*words, "--algo", "ppo", "--seed", "3", "-n", "400"]) == 0
-    assert "trained after 400 steps" in capsys.readouterr().out
+    line = capsys.readouterr().out.splitlines()[-1]
+    seconds = read_state(folder.checkpoint)["seconds"]
+    assert line.startswith("trained after 400 steps in ")
+    speed = float(line.partition("(")[2].partition(" steps/s")[0].replace(",", ""))
+    assert speed == pytest.approx(400 / seconds, rel=0.3)  # of the whole run
     assert [path.name for path in (tmp_path / "ppo").iterdir()] == ["Test-Reach-v0_1"]

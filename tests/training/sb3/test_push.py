@@ -1,4 +1,4 @@
-"""The adapter, training and evaluation on the real environment."""
+"""The adapter, training and evaluation on Push."""
 
 import numpy as np
 import pytest
@@ -6,14 +6,13 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.her import HerReplayBuffer
 
-from training.policies.policy import scripted_policy
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.results.plot import plot_learning_curves
 from training.results.record import record
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import load_config
+from training.settings.config_file import load_config
 from training.settings.environments import make_vector_env
 
 PUSH = "RigidEnvs/Push-v0"
@@ -32,7 +31,7 @@ def random_actions(env, random) -> np.ndarray:
     return random.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
 
 
-def test_observations_and_rewards_fit_their_spaces(push):
+def test_observations_and_rewards_are_within_their_spaces(push):
     push.seed(0)
     observation = push.reset()
     random = np.random.default_rng(0)
@@ -46,7 +45,7 @@ def test_observations_and_rewards_fit_their_spaces(push):
         assert len(infos) == WORLDS
 
 
-def test_episodes_are_cut_short_by_time_with_a_terminal_observation_of_their_own(push):
+def test_truncated_episodes_have_their_own_terminal_observation(push):
     push.seed(0)
     first = push.reset()
     goals = first["desired_goal"].copy()
@@ -70,21 +69,23 @@ def test_episodes_are_cut_short_by_time_with_a_terminal_observation_of_their_own
         assert relabelled[0] == rewards[world]
 
 
-def test_terminal_observations_outlive_later_steps(push):
+def test_later_steps_do_not_change_terminal_observations(push):
     push.seed(0)
     push.reset()
     random = np.random.default_rng(0)
     for _ in range(EPISODE):
         _, _, _, infos = push.step(random_actions(push, random))
-    kept = [{k: v.copy() for k, v in info["terminal_observation"].items()} for info in infos]
+    expected_observations = [
+        {k: v.copy() for k, v in info["terminal_observation"].items()} for info in infos
+    ]
     for _ in range(EPISODE):
         push.step(random_actions(push, random))
-    for info, expected in zip(infos, kept, strict=True):
+    for info, expected in zip(infos, expected_observations, strict=True):
         for key, value in info["terminal_observation"].items():
             np.testing.assert_array_equal(value, expected[key])
 
 
-def test_hindsight_replay_relabels_pushes(push):
+def test_her_relabels_transitions_of_push(push):
     model = SAC(
         "MultiInputPolicy",
         VecMonitor(push),
@@ -99,10 +100,10 @@ def test_hindsight_replay_relabels_pushes(push):
     model.learn(EPISODE * WORLDS + 20)
     rewards = model.replay_buffer.sample(64).rewards.numpy()
     assert set(np.unique(rewards)) <= {-1.0, 0.0}
-    assert 0.0 in rewards  # a goal taken from the future of a resting cube is reached
+    assert 0.0 in rewards  # a cube at rest reaches every goal from its future
 
 
-def test_a_short_run_trains_evaluates_films_and_draws(tmp_path):
+def test_short_run_trains_evaluates_records_and_plots(tmp_path):
     config = load_config("ppo", PUSH).replace(
         n_envs=16, n_timesteps=16 * 100, n_steps=50, batch_size=400, target_success_rate=None
     )
@@ -117,14 +118,10 @@ def test_a_short_run_trains_evaluates_films_and_draws(tmp_path):
     assert plot_learning_curves([folder]).stat().st_size < 300_000
 
 
-def test_the_packaged_settings_build_on_the_environment(tmp_path):
+def test_packaged_sac_settings_train(tmp_path):
     packaged = load_config("sac", PUSH)
     first = packaged.n_envs * EPISODE
     config = packaged.replace(
         n_timesteps=first + 2 * packaged.n_envs, learning_starts=first, buffer_size=2 * first
     )
     assert train(config, tmp_path, quiet=True).steps > first
-
-
-def test_the_scripted_controller_solves_nearly_all():
-    assert evaluate(scripted_policy(PUSH), 100, quiet=True).success_at_end.mean() >= 0.97

@@ -1,4 +1,4 @@
-"""Torch leaves its second core to the worlds while they are stepped, and has it back after."""
+"""Torch has one thread in rollouts, and the requested number in updates."""
 
 import pytest
 import torch
@@ -6,22 +6,22 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy as Policy
 
 from training.sb3.train import train
-from training.settings.config import load_config
+from training.settings.config_file import load_config
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_rollouts_take_one_thread_and_updates_as_many_as_asked(tmp_path, monkeypatch, threads):
+def test_rollouts_have_one_thread_and_updates_the_requested_number(tmp_path, monkeypatch, threads):
     seen = {"rollout": set(), "update": set()}
 
-    def noting(name, function):
+    def recording(name, function):
         def call(self, *arguments, **named):
             seen[name].add(torch.get_num_threads())
             return function(self, *arguments, **named)
 
         return call
 
-    monkeypatch.setattr(PPO, "train", noting("update", PPO.train))
-    monkeypatch.setattr(Policy, "forward", noting("rollout", Policy.forward))
+    monkeypatch.setattr(PPO, "train", recording("update", PPO.train))
+    monkeypatch.setattr(Policy, "forward", recording("rollout", Policy.forward))
     config = load_config("ppo", "RigidEnvs/Push-v0").replace(
         n_envs=8, n_timesteps=800, n_steps=50, batch_size=100
     )

@@ -1,4 +1,4 @@
-"""The search for settings: small, on the test double."""
+"""The search for settings, on a small test environment."""
 
 import sqlite3
 from functools import partial
@@ -10,7 +10,8 @@ from optuna.trial import TrialState
 
 from training.commands import cli, tuning
 from training.commands.tuning import tune
-from training.settings.config import TrainConfig, load_config
+from training.settings.config import TrainConfig
+from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 from training.settings.search_space import SPACES, OneOf, draw, with_drawn
 
@@ -21,7 +22,7 @@ def study_of(path) -> optuna.Study:
 
 @pytest.fixture(autouse=True)
 def small_space(monkeypatch, request):
-    """Trials that take a moment, and one thread, which neither waits nor makes others wait."""
+    """Short trials on one torch thread."""
     if "whole_space" in request.fixturenames:
         return
     ppo = {"n_steps": (5, 10), "minibatches": (1, 2), "n_epochs": (1, 2), "net_arch": ("8", "8 8")}
@@ -39,7 +40,7 @@ def one_thread(train, *arguments, **options):
 
 @pytest.fixture
 def whole_space():
-    """Keeps the table as it is."""
+    """Keeps the search space unchanged."""
 
 
 @pytest.fixture
@@ -50,7 +51,7 @@ def words(reach, tmp_path, quick_ppo, write_yaml) -> list[str]:
     return ["tune", "--env", reach, "--config", str(config), "-f", str(tmp_path), *tiny]
 
 
-def test_the_best_settings_are_yaml_that_train_takes(
+def test_best_settings_are_yaml_that_train_accepts(
     words, reach, tmp_path, quick_ppo, write_yaml, capsys
 ):
     assert cli.main(words) == 0
@@ -66,11 +67,11 @@ def test_the_best_settings_are_yaml_that_train_takes(
         if name not in searched:
             assert best.as_mapping()[name] == value, name
     assert best.policy_kwargs["activation"] == "tanh"
-    # trials leave no runs, only the database
+    # trials leave no run folders, only the database
     assert [path.name for path in (tmp_path / "ppo").iterdir()] == ["Test-Reach-v0_tuning.db"]
 
 
-def test_the_same_command_goes_on(words, tmp_path, capsys):
+def test_same_command_continues_the_search(words, tmp_path, capsys):
     assert cli.main(words) == 0
     study = study_of(tmp_path / "ppo" / "Test-Reach-v0_tuning.db")
     assert len(study.trials) == 2
@@ -85,7 +86,7 @@ def test_the_same_command_goes_on(words, tmp_path, capsys):
     assert len(learning_rates) == 3
 
 
-def test_ctrl_c_keeps_what_is_known(words, tmp_path, monkeypatch, capsys):
+def test_ctrl_c_keeps_complete_trials(words, tmp_path, monkeypatch, capsys):
     success = tuning._success
 
     def interrupted(config, trial, *rest):
@@ -106,7 +107,7 @@ def test_ctrl_c_keeps_what_is_known(words, tmp_path, monkeypatch, capsys):
     assert states == [TrialState.COMPLETE, TrialState.FAIL, TrialState.COMPLETE]
 
 
-def test_ctrl_c_before_anything_is_known_prints_nothing(words, monkeypatch, capsys):
+def test_ctrl_c_before_the_first_complete_trial_prints_nothing(words, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -115,17 +116,17 @@ def test_ctrl_c_before_anything_is_known_prints_nothing(words, monkeypatch, caps
     assert capsys.readouterr().out == ""
 
 
-def test_ctrl_c_within_a_training_ends_the_search(words, monkeypatch, capsys):
+def test_ctrl_c_during_training_ends_the_search(words, monkeypatch, capsys):
     def interrupted(self):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tuning.Look, "_on_step", interrupted)
+    monkeypatch.setattr(tuning.Pruning, "_on_step", interrupted)
     assert cli.main(words) == 130
     assert "trial 0: interrupted" in capsys.readouterr().err
 
 
-def test_poor_trials_are_cut_short(quick_ppo, tmp_path, monkeypatch, capsys):
-    """The median pruner's own verdict, asked for at each look but the last."""
+def test_poor_trials_are_stopped_early(quick_ppo, tmp_path, monkeypatch, capsys):
+    """The median pruner decides at each intermediate report except the last."""
     asked = []
     monkeypatch.setattr(
         optuna.Trial, "should_prune", lambda trial: asked.append(trial.number) or trial.number == 1
@@ -137,10 +138,10 @@ def test_poor_trials_are_cut_short(quick_ppo, tmp_path, monkeypatch, capsys):
     assert asked == [0] * 9 + [1] + [2] * 9
     assert list(study.trials[0].intermediate_values) == list(range(1, 10))
     assert "best of 3 trials" in found.summary
-    assert "trial 1: cut short" in capsys.readouterr().err
+    assert "trial 1: stopped early" in capsys.readouterr().err
 
 
-def test_a_trial_that_diverges_does_not_end_the_search(quick_ppo, tmp_path, monkeypatch, capsys):
+def test_diverged_trial_does_not_end_the_search(quick_ppo, tmp_path, monkeypatch, capsys):
     success = tuning._success
 
     def diverging(config, trial, *rest):
@@ -154,25 +155,23 @@ def test_a_trial_that_diverges_does_not_end_the_search(quick_ppo, tmp_path, monk
     assert "trial 0: failed: weights are not finite" in capsys.readouterr().err
 
 
-def test_a_search_of_failures_says_why(quick_ppo, tmp_path, monkeypatch):
+def test_search_in_which_all_trials_fail_reports_the_error(quick_ppo, tmp_path, monkeypatch):
     def diverging(*_):
         raise ValueError("weights are not finite")
 
     monkeypatch.setattr(tuning, "_success", diverging)
-    with pytest.raises(UsageError, match="none of 2 trials came to an end; the last said: weights"):
+    with pytest.raises(UsageError, match="all 2 trials failed; the error of the last one: weights"):
         tune(quick_ppo, tmp_path, trials=2)
 
 
-def test_hindsight_is_searched_too(quick_sac, tmp_path):
+def test_search_supports_her(quick_sac, tmp_path):
     found = tune(quick_sac.replace(n_timesteps=100), tmp_path, trials=1, episodes=10)
     assert found.settings is not None
     assert found.settings.replay_buffer_class == "HerReplayBuffer"
 
 
 @pytest.mark.parametrize("algo", SPACES)
-def test_every_row_of_the_table_gives_settings_that_are_taken(
-    algo, quick_ppo, quick_sac, whole_space
-):
+def test_every_row_of_the_table_gives_valid_settings(algo, quick_ppo, quick_sac, whole_space):
     config: TrainConfig = {"ppo": quick_ppo, "sac": quick_sac}[algo]
     config = config.replace(n_envs=64)
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
@@ -186,11 +185,11 @@ def test_every_row_of_the_table_gives_settings_that_are_taken(
     }
 
 
-def test_a_study_of_other_settings_is_refused(words, tmp_path, capsys):
+def test_study_with_other_settings_raises(words, tmp_path, capsys):
     assert cli.main(words) == 0
     capsys.readouterr()
     for flags, complaint in (
-        (["-n", "320"], "n_timesteps is 320, but study 'ppo-Test-Reach-v0' was begun with 160"),
+        (["-n", "320"], "n_timesteps is 320, but study 'ppo-Test-Reach-v0' was started with 160"),
         (["--seed", "9"], "seed is 9, but"),
         (["--n-envs", "16"], "n_envs is 16, but"),
         (["--n-episodes", "30"], "episodes is 30, but"),
@@ -211,7 +210,7 @@ def test_storage_is_a_file_or_a_url(quick_ppo, tmp_path):
             assert database.execute("select count(*) from trials").fetchone() == (1,)
 
 
-def test_a_storage_that_is_none_is_named(quick_ppo, tmp_path):
+def test_invalid_storage_raises(quick_ppo, tmp_path):
     file = tmp_path / "notes.db"
     file.write_text("no database, but some text that is longer than a header of one " * 20)
     before = file.read_bytes()

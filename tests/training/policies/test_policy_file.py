@@ -1,4 +1,4 @@
-"""Policy files: they act as Stable-Baselines3 does, and nothing but what was written is read."""
+"""Policy files: they act as Stable-Baselines3's policies, and damaged files are rejected."""
 
 import base64
 import hashlib
@@ -20,8 +20,10 @@ from training.commands import cli
 from training.policies.policy_file import load_policy_file, read_policy
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
+from training.results.results import SOURCE
 from training.sb3.train import train
-from training.settings.config import ALGORITHMS, BOUNDED, load_config, packaged_environments
+from training.settings.config import ALGORITHMS, BOUNDED_POLICY
+from training.settings.config_file import load_config, packaged_environments
 from training.settings.errors import UsageError
 
 KEYS = ("observation", "achieved_goal", "desired_goal")
@@ -33,8 +35,8 @@ def observations(count: int = 200, scale: float = 2.0) -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory) -> Path:
-    """A policy file of PPO with statistics."""
+def saved(tmp_path_factory) -> Path:
+    """A policy file of PPO with observation statistics."""
     config = load_config("ppo", "RigidEnvs/Push-v0").as_mapping() | {
         "n_envs": 8,
         "n_timesteps": 160,
@@ -48,7 +50,7 @@ def kept(tmp_path_factory) -> Path:
 
 
 def rewritten(path: Path, tmp_path: Path, numbers: bytes = b"", **changes) -> Path:
-    """The file with another header, or more numbers, under a checksum that fits."""
+    """A copy with a changed header or additional numbers, and a valid checksum."""
     first, _, body = path.read_bytes().split(b"\n", 2)
     text, _, rest = body.partition(b"\0")
     header = json.loads(text)
@@ -67,21 +69,21 @@ def rewritten(path: Path, tmp_path: Path, numbers: bytes = b"", **changes) -> Pa
 
 @pytest.mark.parametrize("normalize", [False, True])
 @pytest.mark.parametrize("activation", ["tanh", "relu", "elu"])
-def test_a_file_acts_as_ppo_does(quick_ppo, tmp_path, normalize, activation):
+def test_file_acts_as_ppo(quick_ppo, tmp_path, normalize, activation):
     network = {"net_arch": [16, 8], "activation": activation, "log_std_init": 0.0}
     config = quick_ppo.replace(normalize=normalize, policy_kwargs=network, learning_rate=0.05)
     folder = train(config, tmp_path, quiet=True).folder
     expected = trained_policy(folder.model, trust_pickle=True)
-    # far enough to be clipped nearly everywhere, or as far as float32 carries six digits
+    # large enough that normalised values are clipped; otherwise within six digits of float32
     for scale in (0.3, 50.0 if normalize else 2.0):
         action = read_policy(folder.policy).act(observations(scale=scale))
         assert action.dtype == np.float32
         np.testing.assert_allclose(action, expected.act(observations(scale=scale)), atol=1e-6)
 
 
-def test_a_file_acts_as_a_bounded_policy_does(quick_ppo, tmp_path):
-    network = {"net_arch": [16, 8], "least_std": 0.1}
-    config = quick_ppo.replace(policy=BOUNDED, policy_kwargs=network, learning_rate=0.05)
+def test_file_acts_as_a_bounded_policy(quick_ppo, tmp_path):
+    network = {"net_arch": [16, 8], "min_std": 0.1}
+    config = quick_ppo.replace(policy=BOUNDED_POLICY, policy_kwargs=network, learning_rate=0.05)
     folder = train(config, tmp_path, quiet=True).folder
     expected = trained_policy(folder.model, trust_pickle=True)
     for scale in (0.3, 3.0):
@@ -91,16 +93,18 @@ def test_a_file_acts_as_a_bounded_policy_does(quick_ppo, tmp_path):
 
 
 @pytest.mark.parametrize("normalize", [False, True])
-def test_a_file_acts_as_sac_does(quick_sac, tmp_path, normalize, monkeypatch):
-    monkeypatch.setattr(ReachVectorEnv, "__init__", with_lopsided_actions(ReachVectorEnv.__init__))
+def test_file_acts_as_sac(quick_sac, tmp_path, normalize, monkeypatch):
+    monkeypatch.setattr(
+        ReachVectorEnv, "__init__", with_asymmetric_actions(ReachVectorEnv.__init__)
+    )
     folder = train(quick_sac.replace(normalize=normalize), tmp_path, quiet=True).folder
     action = read_policy(str(folder.policy)).act(observations())
     expected = trained_policy(folder.model, trust_pickle=True).act(observations())
     np.testing.assert_allclose(action, expected, rtol=1e-6, atol=1e-6)
 
 
-def with_lopsided_actions(init):
-    """Bounds of actions that are not ±1: a squashed output must be stretched to them."""
+def with_asymmetric_actions(init):
+    """Action bounds other than ±1, to which a squashed output must be scaled."""
 
     def made(self, *args, **kwargs):
         init(self, *args, **kwargs)
@@ -110,37 +114,37 @@ def with_lopsided_actions(init):
     return made
 
 
-def test_an_action_does_not_depend_on_how_many_worlds_act(kept):
-    policy, all_of_them = read_policy(kept), observations()
-    together = policy.act(all_of_them)
-    alone = [policy.act({k: v[i : i + 1] for k, v in all_of_them.items()})[0] for i in range(50)]
+def test_action_does_not_depend_on_the_number_of_worlds(saved):
+    policy, batch = read_policy(saved), observations()
+    together = policy.act(batch)
+    alone = [policy.act({k: v[i : i + 1] for k, v in batch.items()})[0] for i in range(50)]
     np.testing.assert_allclose(alone, together[:50], atol=1e-7)
 
 
-def test_what_is_no_policy_is_not_to_be_trusted(tmp_path):
+def test_file_that_is_no_policy_raises(tmp_path):
     (tmp_path / "README.md").write_text("# Policies")
-    with pytest.raises(UsageError, match=r"README.md is no policy, should be .* or model.zip$"):
+    with pytest.raises(UsageError, match=r"README.md is not a policy; it should be .* model.zip$"):
         trained_policy(tmp_path / "README.md")
 
 
-def test_one_world_is_told_to_be_an_axis_short(kept):
-    with pytest.raises(UsageError, match=r"of many worlds, this is of one: .* value\[None\]"):
-        read_policy(kept).act({key: value[0] for key, value in observations().items()})
+def test_observation_without_batch_axis_raises(saved):
+    with pytest.raises(UsageError, match=r"no batch axis; add one: .* value\[None\]"):
+        read_policy(saved).act({key: value[0] for key, value in observations().items()})
 
 
-def test_reading_takes_neither_torch_nor_stable_baselines(kept):
+def test_reading_imports_neither_torch_nor_stable_baselines(saved):
     code = (
         "import sys; from pathlib import Path;"
         "from training.policies.policy_file import load_policy_file;"
         "load_policy_file(Path(sys.argv[1]));"
         "sys.exit(any(name in sys.modules for name in ('torch', 'stable_baselines3')))"
     )
-    words = [sys.executable, "-c", code, str(kept)]
-    assert subprocess.run(words, cwd=Path(__file__).parents[2]).returncode == 0
+    words = [sys.executable, "-c", code, str(saved)]
+    assert subprocess.run(words, cwd=Path(__file__).parents[3]).returncode == 0
 
 
-def test_the_header_says_what_was_trained(kept):
-    header = load_policy_file(kept).header
+def test_header_describes_the_training(saved):
+    header = load_policy_file(saved).header
     assert header.algorithm == "ppo"
     assert header.environment.id == "Test/Reach-v0"
     assert header.environment.version == 0
@@ -149,10 +153,10 @@ def test_the_header_says_what_was_trained(kept):
     assert header.network.widths == [6, 64, 64, 2]
     assert (header.steps, header.seed, header.success) == (160, 0, None)
     assert header.versions["torch"]
-    assert b'"algorithm": "ppo"' in kept.read_bytes()[:200]
+    assert b'"algorithm": "ppo"' in saved.read_bytes()[:200]
 
 
-def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
+def test_packaged_networks_take_less_than_300_kilobytes(reach, tmp_path):
     for algo, kind in ALGORITHMS.items():
         for env_id in packaged_environments(algo):
             full = load_config(algo, env_id)
@@ -168,8 +172,8 @@ def test_configured_networks_take_less_than_300_kilobytes(reach, tmp_path):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(st.data())
-def test_any_byte_that_is_another_is_refused(kept, tmp_path, data):
-    whole = kept.read_bytes()
+def test_any_changed_byte_raises(saved, tmp_path, data):
+    whole = saved.read_bytes()
     if data.draw(st.booleans()):
         damaged = whole[: data.draw(st.integers(0, len(whole) - 1))]
     else:
@@ -196,9 +200,9 @@ FIELDS += ["network__activation", "normalization__keys", "normalization__clip"]
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(field=st.sampled_from(FIELDS), value=JSON)
-def test_a_header_that_was_made_up_is_refused_or_acts(kept, tmp_path, field, value):
+def test_arbitrary_header_raises_or_acts(saved, tmp_path, field, value):
     try:
-        policy = read_policy(rewritten(kept, tmp_path, **{field: value}))
+        policy = read_policy(rewritten(saved, tmp_path, **{field: value}))
     except UsageError:
         return
     assert policy.act(observations()).shape == (200, 2)
@@ -212,68 +216,77 @@ def test_a_header_that_was_made_up_is_refused_or_acts(kept, tmp_path, field, val
         ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         ({"network__widths": [6, 64, 32, 2]}, "bytes of numbers"),
-        ({"network__widths": [7, 64, 64, 2]}, "begins with 7, should be 6"),
+        ({"network__widths": [7, 64, 64, 2]}, "starts with 7, should be 6"),
         ({"network__widths": [6, 2**40, 2**40, 2]}, "bytes of numbers"),
         ({"network__low": [-1.0]}, "network.low has 1 entries, should have 2"),
         ({"observation": {"observation": [6]}}, "should be observation"),
         ({"environment__version": 1}, "version is 1, but environment.id"),
         ({"normalization__clip": -1}, "should be above 0"),
-        ({"colour": "red"}, "at odds: colour"),
+        ({"colour": "red"}, "missing or unknown: colour"),
         ({"numbers": b"1234"}, "bytes of numbers"),
     ],
 )
-def test_headers_that_cannot_be_are_named(kept, tmp_path, changes, message):
+def test_invalid_header_fields_are_named(saved, tmp_path, changes, message):
     with pytest.raises(UsageError, match=message):
-        read_policy(rewritten(kept, tmp_path, **changes))
+        read_policy(rewritten(saved, tmp_path, **changes))
 
 
-def test_other_files_are_named(kept, tmp_path):
+def test_other_files_raise(saved, tmp_path):
     path = tmp_path / "some.policy"
     with pytest.raises(UsageError, match="does not exist"):
         trained_policy(path)
-    with pytest.raises(UsageError, match="No such file"):
+    with pytest.raises(UsageError, match=r"does not exist; it should be a \.policy file"):
         read_policy(path)
     path.write_bytes(b"PK\x03\x04")
-    with pytest.raises(UsageError, match="is no policy file"):
+    with pytest.raises(UsageError, match="is not a policy file"):
         read_policy(path)
-    path.write_bytes(kept.read_bytes().replace(b"policy 1\n", b"policy 2\n", 1))
-    with pytest.raises(UsageError, match="has version '2' of the format, should be 1"):
+    path.write_bytes(saved.read_bytes().replace(b"policy 1\n", b"policy 2\n", 1))
+    with pytest.raises(UsageError, match="has format version '2', should be 1"):
         read_policy(path)
 
 
-def test_another_version_of_the_environment_is_named(kept, tmp_path):
+def test_another_version_of_the_environment_raises(saved, tmp_path):
     other = {"id": "Test/Reach-v7", "version": 7, "kwargs": {}}
-    path = rewritten(kept, tmp_path, environment=other)
-    with pytest.raises(UsageError, match="trained on Test/Reach-v7, installed is Test/Reach-v0"):
+    path = rewritten(saved, tmp_path, environment=other)
+    with pytest.raises(
+        UsageError, match="trained on Test/Reach-v7, but Test/Reach-v0 is installed"
+    ):
         read_policy(path)
     assert read_policy(path, env_id="Test/Reach-v0").env_id == "Test/Reach-v0"
 
 
-def test_no_module_is_imported_that_a_file_names(kept, tmp_path, monkeypatch):
+def test_arguments_that_an_id_sets_replace_those_of_training():
+    file = SOURCE / "results/sac/RigidEnvs-Push-v0_seed0/policy.policy"
+    assert read_policy(file).env_kwargs == {"reward_type": "sparse", "fidelity": "balanced"}
+    dense = read_policy(file, env_id="RigidEnvs/PushDense-v0")
+    assert dense.env_kwargs == {"reward_type": "dense", "fidelity": "balanced"}
+
+
+def test_module_named_in_a_file_is_not_imported(saved, tmp_path, monkeypatch):
     (tmp_path / "intruder.py").write_text("raise AssertionError('imported')")
     monkeypatch.syspath_prepend(str(tmp_path))
     other = {"id": "intruder:RigidEnvs/Posh-v0", "version": 0, "kwargs": {}}
     with pytest.raises(UsageError, match="not installed; did you mean --env RigidEnvs/Push-v0"):
-        read_policy(rewritten(kept, tmp_path, environment=other))
+        read_policy(rewritten(saved, tmp_path, environment=other))
 
 
-def test_a_policy_that_has_diverged_is_not_written(kept):
-    content = load_policy_file(kept)
+def test_diverged_policy_is_not_written(saved):
+    content = load_policy_file(saved)
     content.layers[0] = (content.layers[0][0] * np.float32(np.nan), content.layers[0][1])
     with pytest.raises(UsageError, match="training has diverged"):
         content.to_bytes()
 
 
-def test_an_environment_that_is_shown_otherwise_is_named(kept):
-    with pytest.raises(UsageError, match=r"the environment's are \{'observation': "):
-        read_policy(kept).act({"observation": np.zeros((1, 3), np.float32)})
+def test_observation_of_another_shape_raises(saved):
+    with pytest.raises(UsageError, match=r"but the environment has \{'observation': "):
+        read_policy(saved).act({"observation": np.zeros((1, 3), np.float32)})
 
 
-def test_arguments_in_a_file_cannot_clash_with_our_own(kept, tmp_path):
+def test_reserved_arguments_in_a_file_raise(saved, tmp_path):
     for name in ("env_id", "num_envs", "autoreset_mode"):
         kwargs = {"id": "Test/Reach-v0", "version": 0, "kwargs": {name: 3}}
-        with pytest.raises(UsageError, match="refuses"):
-            evaluate(read_policy(rewritten(kept, tmp_path, environment=kwargs)), 1, quiet=True)
+        with pytest.raises(UsageError, match="rejects"):
+            evaluate(read_policy(rewritten(saved, tmp_path, environment=kwargs)), 1, quiet=True)
 
 
 class Intruder:
@@ -286,7 +299,7 @@ class Intruder:
         return Path.touch, (self.trace,)
 
 
-def test_nothing_is_unpickled_without_leave(quick_ppo, tmp_path, capsys):
+def test_nothing_is_unpickled_without_permission(quick_ppo, tmp_path, capsys):
     folder = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True).folder
     trace = tmp_path / "trace"
     trap = pickle.dumps(Intruder(trace))
@@ -296,8 +309,8 @@ def test_nothing_is_unpickled_without_leave(quick_ppo, tmp_path, capsys):
         model.writestr("data", json.dumps({"policy_class": packed}))
     run, elsewhere = str(folder.path), str(tmp_path / "other.policy")
     Path(elsewhere).write_bytes(folder.model.read_bytes())
-    for word in (run, str(folder.policy)):
-        assert cli.main(["evaluate", word, "-n", "2"]) == 0
+    for policy in (run, str(folder.policy)):
+        assert cli.main(["evaluate", policy, "-n", "2"]) == 0
     for words in ([str(folder.model)], [elsewhere], [run, "--stochastic"]):
         assert cli.main(["evaluate", *words, "-n", "2"]) == 2
         assert cli.main(["record", *words, "-n", "1"]) == 2
@@ -309,7 +322,7 @@ def test_nothing_is_unpickled_without_leave(quick_ppo, tmp_path, capsys):
     assert trace.exists()  # the trap works
 
 
-def test_export_copies_a_policy_out_of_its_run(quick_ppo, tmp_path, capsys):
+def test_export_copies_the_policy_of_a_run(quick_ppo, tmp_path, capsys):
     folder = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True).folder
     out = tmp_path / "shared" / "reach.policy"
     assert cli.main(["export", str(folder.path), "-o", str(out), "-n", "20", "--sb3"]) == 0

@@ -1,17 +1,17 @@
+"""Evaluation: one episode per seed, whatever the number of worlds; the confidence interval."""
+
 import numpy as np
 import pytest
-from PIL import Image
 from scipy.stats import binomtest
 
 from tests.training.reach import ReachEnv, straight_to_the_goal
-from training.policies import policy as policy_module
 from training.policies.policy import Policy, scripted_policy
 from training.policies.trained_policy import trained_policy
 from training.results import evaluate as evaluate_module
 from training.results.evaluate import evaluate, print_evaluation, wilson_interval
-from training.results.gif import GifWriter
 from training.results.record import record
 from training.sb3.train import train
+from training.scripted import CONTROLLERS
 from training.settings.errors import UsageError
 
 
@@ -22,7 +22,7 @@ def solver(reach) -> Policy:
 
 @pytest.fixture
 def drifter(reach) -> Policy:
-    """Passes the goals that lie to the right, and stops nowhere."""
+    """Passes the goals on the right without stopping."""
 
     def right(observation):
         return np.tile(np.float32([0.5, 0]), (len(observation["observation"]), 1))
@@ -31,12 +31,12 @@ def drifter(reach) -> Policy:
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 10), (10, 10), (973, 1000), (1, 3)])
-def test_interval_is_wilson_s(successes, trials):
+def test_interval_is_that_of_wilson(successes, trials):
     expected = binomtest(successes, trials).proportion_ci(0.95, method="wilson")
     assert wilson_interval(successes, trials) == pytest.approx((expected.low, expected.high))
 
 
-def test_a_controller_that_solves_the_task_scores_all(solver):
+def test_controller_that_solves_the_task_has_success_rate_1(solver):
     result = evaluate(solver, 50, quiet=True)
     assert result.success_at_end.all()
     assert result.success_at_any_time.all()
@@ -49,7 +49,9 @@ def test_success_at_the_end_and_at_any_time_differ(drifter):
 
 
 @pytest.mark.parametrize("terminate_on_success", [False, True])
-def test_episode_i_is_the_single_environment_s_with_seed_plus_i(drifter, terminate_on_success):
+def test_episode_i_is_that_of_the_single_environment_with_seed_plus_i(
+    drifter, terminate_on_success
+):
     kwargs = {"reward_type": "dense", "terminate_on_success": terminate_on_success}
     result = evaluate(drifter, 12, seed=7, quiet=True, **kwargs)
     env = ReachEnv(**kwargs)
@@ -84,7 +86,7 @@ def test_short_episodes_count_no_more_than_long_ones(drifter, monkeypatch):
     np.testing.assert_array_equal(result.success_at_any_time, one_each.success_at_any_time)
 
 
-def test_numbers_out_of_range_are_named(solver, tmp_path):
+def test_numbers_out_of_range_raise(solver, tmp_path):
     with pytest.raises(UsageError, match="number of episodes is 0"):
         evaluate(solver, 0)
     with pytest.raises(UsageError, match="seed is -1"):
@@ -95,41 +97,48 @@ def test_numbers_out_of_range_are_named(solver, tmp_path):
         record(solver, tmp_path / "video.avi")
 
 
-def test_unknown_environment_names_the_nearest():
+def test_unknown_environment_suggests_the_nearest():
     policy = Policy(straight_to_the_goal, "RigidEnvs/Posh-v0", "solver")
     with pytest.raises(UsageError, match=r"did you mean 'RigidEnvs/Push-v0'\?"):
         evaluate(policy, 1)
 
 
-def test_table_shows_success_and_interval(solver, capsys):
-    print_evaluation(solver, evaluate(solver, 100, quiet=True))
+def test_output_shows_success_interval_and_how_the_episodes_were_played(solver, capsys):
+    print_evaluation(solver, evaluate(solver, 100, seed=5, quiet=True))
     shown = capsys.readouterr().out
-    for part in ("success at the end", "100.0%", "96.3% to 100.0%", "10.0 steps"):
+    for part in (
+        "success at the end",
+        "100.0%",
+        "96.3% to 100.0%",
+        "10.0 steps",
+        "5 to 104",
+        "balanced",
+    ):
         assert part in shown
 
 
-def test_scripted_policy_comes_from_the_registry(reach, monkeypatch):
-    monkeypatch.setitem(policy_module.CONTROLLERS, reach, straight_to_the_goal)
+def test_scripted_policy_is_that_of_the_task(reach, monkeypatch):
+    monkeypatch.setitem(CONTROLLERS, "reach", straight_to_the_goal)
     assert evaluate(scripted_policy(reach), 5, quiet=True).success_at_end.all()
-    with pytest.raises(UsageError, match="no scripted controller for environment 'Test/Reech-v0'"):
+    with pytest.raises(UsageError, match="unknown environment 'Test/Reech-v0'"):
         scripted_policy("Test/Reech-v0")
 
 
-def test_a_trained_policy_is_evaluated_as_it_was_trained(quick_ppo, tmp_path):
+def test_trained_policy_is_evaluated_with_the_arguments_of_training(quick_ppo, tmp_path):
     folder = train(quick_ppo, tmp_path, quiet=True).folder
     policy = trained_policy(folder.path)
     assert policy.env_kwargs == {"reward_type": "dense"}
     first, second = (evaluate(policy, 20, quiet=True) for _ in range(2))
     np.testing.assert_array_equal(first.episode_return, second.episode_return)
-    beside = trained_policy(folder.model, trust_pickle=True)
-    assert evaluate(beside, 20, quiet=True).episode_return == pytest.approx(first.episode_return)
+    unpickled = trained_policy(folder.model, trust_pickle=True)
+    assert evaluate(unpickled, 20, quiet=True).episode_return == pytest.approx(first.episode_return)
 
 
-def test_a_model_alone_needs_algorithm_and_environment(quick_ppo, tmp_path, reach):
+def test_model_outside_a_run_folder_requires_algorithm_and_environment(quick_ppo, tmp_path, reach):
     folder = train(quick_ppo, tmp_path, quiet=True).folder
     alone = tmp_path / "alone.zip"
     folder.model.rename(alone)
-    with pytest.raises(UsageError, match="say --algo and --env"):
+    with pytest.raises(UsageError, match="give --algo and --env"):
         trained_policy(alone, trust_pickle=True)
     trusted = trained_policy(alone, algo="ppo", env_id=reach, trust_pickle=True)
     assert trusted.env_id == reach
@@ -139,78 +148,12 @@ def test_a_model_alone_needs_algorithm_and_environment(quick_ppo, tmp_path, reac
         trained_policy(folder.path, deterministic=False)
 
 
-def test_files_that_are_no_policies_are_named(quick_ppo, tmp_path):
+def test_files_that_are_no_policies_raise(quick_ppo, tmp_path):
     with pytest.raises(UsageError, match="does not exist"):
         trained_policy(tmp_path / "nothing")
     folder = train(quick_ppo, tmp_path, quiet=True).folder
-    with pytest.raises(UsageError, match="is a run of ppo, not of 'sac'"):
+    with pytest.raises(UsageError, match="was trained with ppo, not with 'sac'"):
         trained_policy(folder.path, algo="sac")
     folder.model.write_bytes(b"no zip")
-    with pytest.raises(UsageError, match="cannot be read as a policy of ppo"):
+    with pytest.raises(UsageError, match="cannot be read as a ppo policy"):
         trained_policy(folder.model, trust_pickle=True)
-
-
-def test_film_and_still_are_written(solver, tmp_path):
-    video, still = record(solver, tmp_path / "films" / "reach.mp4", episodes=2, quiet=True)
-    assert video.read_bytes()[4:8] == b"ftyp"
-    assert still.read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_gif_has_every_second_picture_for_twice_as_long(solver, tmp_path):
-    video, still = record(solver, tmp_path / "reach.gif", episodes=2, quiet=True)
-    assert still.read_bytes().startswith(b"\x89PNG")
-    with Image.open(video) as film:
-        assert film.format == "GIF"
-        assert film.info["loop"] == 0
-        assert film.size == (64, 48)  # what is small is not enlarged
-
-
-def test_a_gif_shrinks_and_keeps_what_moves(tmp_path):
-    path = tmp_path / "moving.gif"
-    with GifWriter(path, fps=25, width=100) as writer:
-        for step in range(11):
-            frame = np.full((100, 200, 3), 255, np.uint8)
-            frame[:, 10 * step : 10 * step + 40] = (200, 30, 30)
-            writer.append_data(frame)
-    with Image.open(path) as film:
-        assert film.size == (100, 50)
-        assert film.n_frames == 6
-        assert film.info["duration"] == 80  # ms
-        film.seek(5)
-        last = np.asarray(film.convert("RGB"))
-    np.testing.assert_allclose(last[25, 60], (200, 30, 30), atol=3)
-    np.testing.assert_allclose(last[25, 20], 255, atol=3)
-
-
-def test_a_gif_keeps_the_colour_of_what_is_small(tmp_path):
-    path = tmp_path / "ball.gif"
-    shades = np.linspace(180, 255, 200).astype(np.uint8)
-    with GifWriter(path, fps=25) as writer:
-        for step in range(11):
-            frame = np.empty((200, 200, 3), np.uint8)
-            frame[:] = shades[:, None]
-            frame[100:106, 10 * step : 10 * step + 6] = (230, 120, 40)
-            writer.append_data(frame)
-    with Image.open(path) as film:
-        film.seek(5)
-        np.testing.assert_allclose(
-            np.asarray(film.convert("RGB"))[103, 103], (230, 120, 40), atol=10
-        )
-
-
-def test_three_episodes_of_push_make_a_small_gif(tmp_path):
-    video, _ = record(
-        scripted_policy("RigidEnvs/Push-v0"), tmp_path / "push.gif", episodes=3, quiet=True
-    )
-    assert video.stat().st_size <= 300_000
-    with Image.open(video) as film:
-        assert film.size == (320, 320)
-
-
-def test_a_film_that_fails_leaves_no_gif(tmp_path, reach):
-    def fails(observation):
-        raise RuntimeError("ours")
-
-    with pytest.raises(RuntimeError, match="ours"):
-        record(Policy(fails, reach, "fails"), tmp_path / "film.gif", episodes=1, quiet=True)
-    assert not list(tmp_path.iterdir())

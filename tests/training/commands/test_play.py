@@ -1,4 +1,4 @@
-"""Play: keys move the tool as its picture shows it, and a window that is closed ends the game."""
+"""Play: keys move the finger or gripper as the frame shows; closing the window ends the game."""
 
 import numpy as np
 import pygame
@@ -6,13 +6,13 @@ import pytest
 
 from rigid_envs.rendering.window import Key, Window
 from rigid_envs.tasks import Push, Stack, Throw
-from training.commands import cli
+from training.commands import cli, extras
 from training.commands.play import FAST_PACE, MOVES, PACE, Game, action_of, play
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError
 
 PUSH, STACK, THROW = (f"RigidEnvs/{name}-v0" for name in ("Push", "Stack", "Throw"))
-ALONG_X = -90.0  # azimuth at which x points to the right of a picture and y into it
+ALONG_X = -90.0  # degrees, azimuth at which x points to the right of the frame and y away
 
 
 @pytest.fixture
@@ -32,33 +32,33 @@ def game():
 # --- keys ---------------------------------------------------------------------------------------
 
 
-def test_no_key_moves_nothing():
+def test_no_key_gives_no_motion():
     assert action_of([], 3, closed=False, azimuth=ALONG_X).tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("key", MOVES)
-def test_a_key_moves_the_tool_as_the_picture_shows_it(key):
+def test_key_moves_in_the_direction_of_the_frame(key):
     action = action_of([key], 3, closed=False, azimuth=ALONG_X)
     np.testing.assert_allclose(action, PACE * np.array(MOVES[key]), rtol=1e-6)
 
 
 @pytest.mark.parametrize("task", [Push(), Stack(), Throw()], ids=lambda t: type(t).__name__)
 @pytest.mark.parametrize("key", ["right", "left", "up", "down", "r", "f"])
-def test_keys_go_within_45_degrees_of_where_they_point(key, task):
+def test_motion_is_within_45_degrees_of_the_key_s_direction(key, task):
     right, _, forward = task.camera.axes
     away = forward * (1.0, 1.0, 0.0) / np.hypot(*forward[:2])
-    pointed = np.array(MOVES[key]) @ np.stack([right, away, (0.0, 0.0, 1.0)])
+    direction = np.array(MOVES[key]) @ np.stack([right, away, (0.0, 0.0, 1.0)])
     move = action_of([key], 3, closed=False, azimuth=task.camera.azimuth)
-    assert move @ pointed > np.cos(np.radians(45.0)) * PACE
+    assert move @ direction > np.cos(np.radians(45.0)) * PACE
 
 
-def test_keys_add_up_and_opposite_ones_cancel():
+def test_keys_add_up_and_opposite_keys_cancel():
     both = action_of(["right", "up"], 3, closed=False, azimuth=ALONG_X)
     np.testing.assert_allclose(both, [PACE, PACE, 0.0], rtol=1e-6)
     assert not action_of(["left", "right"], 3, closed=False, azimuth=ALONG_X).any()
 
 
-def test_two_keys_of_one_way_are_no_faster_than_one():
+def test_two_keys_of_one_direction_are_no_faster_than_one():
     one, two = (action_of(k, 3, closed=False, azimuth=ALONG_X) for k in (["a"], ["a", "left"]))
     np.testing.assert_array_equal(one, two)
 
@@ -80,7 +80,7 @@ def test_other_keys_do_nothing():
 # --- game ---------------------------------------------------------------------------------------
 
 
-def test_a_key_counts_as_long_as_it_is_down(game):
+def test_key_acts_while_it_is_down(game):
     playing = game(PUSH)
     playing.press([Key("right", True)])
     playing.step()
@@ -91,11 +91,11 @@ def test_a_key_counts_as_long_as_it_is_down(game):
 
 
 @pytest.mark.parametrize(("env_id", "closed"), [(PUSH, False), (STACK, False), (THROW, True)])
-def test_a_hand_that_holds_something_starts_closed(game, env_id, closed):
+def test_gripper_that_holds_an_object_starts_closed(game, env_id, closed):
     assert game(env_id).closed is closed
 
 
-def test_space_lets_the_ball_go(game):
+def test_space_releases_the_ball(game):
     playing = game(THROW)
     heights = []
     for keys in ([], [Key("space", True), Key("space", False)]):
@@ -109,7 +109,7 @@ def test_space_lets_the_ball_go(game):
 
 
 @pytest.mark.parametrize("key", ["n", "backspace"])
-def test_a_new_episode_begins_on_request(game, key):
+def test_key_starts_a_new_episode(game, key):
     playing = game(PUSH)
     goal = playing.env.unwrapped._runner.goals.copy()
     playing.step()
@@ -118,14 +118,14 @@ def test_a_new_episode_begins_on_request(game, key):
     assert (playing.env.unwrapped._runner.goals != goal).any()
 
 
-def test_an_episode_that_ends_is_followed_by_the_next(game):
+def test_next_episode_follows_the_end_of_an_episode(game):
     playing = game(PUSH, max_episode_steps=2)
     for _ in range(3):
         playing.step()
     assert playing.steps == 1
 
 
-def test_the_text_tells_step_reward_and_success(game):
+def test_text_shows_step_reward_and_success(game):
     playing = game(PUSH)
     playing.step()
     assert "step 1" in playing.text[0]
@@ -142,7 +142,7 @@ def test_the_text_tells_step_reward_and_success(game):
 
 @pytest.fixture
 def keyboard(monkeypatch):
-    """Posts pygame events before the nth picture is shown, by n; lists the texts under "shown"."""
+    """Posts pygame events before the nth frame is shown, by n; lists the texts under "shown"."""
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     script = {"shown": (shown := [])}
     show = Window.show
@@ -187,22 +187,22 @@ def test_keys_reach_the_environment(keyboard):
     assert steps == ["0", "1", "2", "1", "2"]
 
 
-def test_an_episode_has_no_limit_of_steps_unless_asked_for(keyboard):
+def test_episodes_have_no_step_limit_by_default(keyboard):
     keyboard[60] = [down(pygame.K_ESCAPE)]
     play(PUSH, seed=0, **SMALL)
     assert keyboard["shown"][-1][0].startswith("step 59 ")
 
 
-def test_without_a_display_there_is_no_game(monkeypatch):
+def test_no_display_raises(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
-    with pytest.raises(UsageError, match="no window can be opened"):
+    with pytest.raises(UsageError, match="cannot open a window"):
         play(PUSH, **SMALL)
 
 
 # --- command ------------------------------------------------------------------------------------
 
 
-def test_the_command_takes_what_the_environment_does(keyboard, capsys):
+def test_command_passes_arguments_to_the_environment(keyboard, capsys):
     keyboard[1] = [down(pygame.K_ESCAPE)]
     words = ["play", STACK, "--blocks", "3", "--fidelity", "fast", "--seed", "1"]
     words += ["--reward", "dense", "--show-forces", "--show-particles"]
@@ -219,18 +219,19 @@ def test_the_command_takes_what_the_environment_does(keyboard, capsys):
         (["--fidelity", "lavish"], "lavish"),
     ],
 )
-def test_mistakes_are_told_in_one_line(words, complaint, capsys):
+def test_mistakes_are_reported_in_one_line(words, complaint, capsys):
     assert cli.main(["play", *words]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("error: ")
-    assert told.count("\n") == 1
-    assert complaint in told
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+    assert complaint in error
 
 
-def test_playing_needs_pygame_alone(monkeypatch, capsys):
-    monkeypatch.setattr(cli, "TRAIN_EXTRA", ("no_such_package",))
-    monkeypatch.setattr(cli, "RENDER_EXTRA", ("no_such_pygame",))
+def test_play_requires_only_pygame(monkeypatch, capsys):
+    monkeypatch.setattr(extras, "TRAIN_EXTRA", ("no_such_package",))
+    monkeypatch.setattr(extras, "RENDER_EXTRA", ("no_such_pygame",))
     assert cli.main(["play"]) == 2
     assert capsys.readouterr().err == (
-        'error: this command needs no_such_pygame: pip install "rigid-envs[render]"\n'
+        "error: this command requires no_such_pygame; "
+        'to install: pip install "rigid-envs[render]"\n'
     )

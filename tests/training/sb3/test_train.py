@@ -1,3 +1,5 @@
+"""Training: run folders, checkpoints, early stopping, learning curves."""
+
 import csv
 
 import numpy as np
@@ -6,17 +8,19 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from training.policies.trained_policy import trained_policy
 from training.results.plot import plot_learning_curves, read_learning_curve
+from training.sb3 import build
 from training.sb3 import train as train_module
+from training.sb3.build import LinearSchedule
 from training.sb3.progress import StopAtSuccess
-from training.sb3.train import LinearSchedule, train
+from training.sb3.train import train
 from training.settings.errors import UsageError
 
 
-def test_a_run_leaves_logs_and_a_policy(quick_ppo, tmp_path):
+def test_run_writes_logs_and_a_policy(quick_ppo, tmp_path):
     result = train(quick_ppo, tmp_path, quiet=True)
     assert result.steps == 160
     assert not result.interrupted
-    assert 0 < result.environment_share < 1
+    assert 0 < result.environment_time_fraction < 1
     names = {path.name.split(".")[0] for path in result.folder.path.iterdir()}
     assert names == {"config", "run", "versions", "progress", "checkpoint_2", "events"}
     with result.folder.progress.open() as file:
@@ -24,7 +28,7 @@ def test_a_run_leaves_logs_and_a_policy(quick_ppo, tmp_path):
     assert [int(row["time/total_timesteps"]) for row in rows] == [80, 160]
 
 
-def test_the_same_seed_trains_the_same_policy(quick_ppo, tmp_path):
+def test_same_seed_gives_the_same_policy(quick_ppo, tmp_path):
     observation = {
         key: np.full((2, 2), 0.3, np.float32)
         for key in ("observation", "achieved_goal", "desired_goal")
@@ -37,18 +41,18 @@ def test_the_same_seed_trains_the_same_policy(quick_ppo, tmp_path):
     assert not np.array_equal(actions[0], actions[2])
 
 
-def test_a_drawn_seed_is_recorded(quick_ppo, tmp_path):
+def test_random_seed_is_recorded(quick_ppo, tmp_path):
     result = train(quick_ppo.replace(seed=None), tmp_path, quiet=True)
     assert isinstance(result.folder.config().seed, int)
 
 
-def test_off_policy_learning_with_hindsight_runs(quick_sac, tmp_path):
+def test_sac_with_her_trains(quick_sac, tmp_path):
     result = train(quick_sac, tmp_path, quiet=True)
     assert result.steps == 200
     assert trained_policy(result.folder.path).name.startswith("sac")
 
 
-def test_normalisation_is_saved_and_used(quick_ppo, tmp_path):
+def test_normalization_is_saved_and_used(quick_ppo, tmp_path):
     result = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True)
     assert result.folder.normalization.exists()
     observation = {
@@ -63,7 +67,7 @@ def test_normalisation_is_saved_and_used(quick_ppo, tmp_path):
     assert not np.allclose(sb3.act(observation), with_statistics, atol=1e-6)
 
 
-def test_ctrl_c_keeps_what_was_learned(quick_ppo, tmp_path, monkeypatch):
+def test_ctrl_c_saves_the_policy(quick_ppo, tmp_path, monkeypatch):
     class CtrlC(BaseCallback):
         def _on_step(self) -> bool:
             if self.num_timesteps > 100:
@@ -76,7 +80,7 @@ def test_ctrl_c_keeps_what_was_learned(quick_ppo, tmp_path, monkeypatch):
     assert trained_policy(result.folder.path)
 
 
-def test_checkpoints_are_saved_on_the_way(quick_ppo, tmp_path, monkeypatch):
+def test_checkpoints_are_saved_during_training(quick_ppo, tmp_path, monkeypatch):
     class Crash(BaseCallback):
         def _on_step(self) -> bool:
             if self.num_timesteps > 100:
@@ -90,15 +94,15 @@ def test_checkpoints_are_saved_on_the_way(quick_ppo, tmp_path, monkeypatch):
 
 
 def test_training_stops_when_a_full_window_of_episodes_succeeds(quick_ppo, tmp_path, monkeypatch):
-    monkeypatch.setattr(train_module, "SUCCESS_WINDOW", 8)
-    # Every episode ends in failure or success; a target this low is met by the first success.
+    monkeypatch.setattr(build, "SUCCESS_WINDOW", 8)
+    # so low a target is reached by the first success
     config = quick_ppo.replace(n_timesteps=100_000, target_success_rate=0.01, seed=0)
     result = train(config, tmp_path, quiet=True)
     assert result.steps < 100_000
     assert result.success_rate >= 0.01
 
 
-def test_a_window_that_is_not_full_does_not_stop_training():
+def test_incomplete_window_does_not_stop_training():
     from collections import deque
     from types import SimpleNamespace
 
@@ -123,27 +127,25 @@ def test_linear_learning_rate_survives_saving(quick_ppo, tmp_path):
     assert trained_policy(result.folder.path)
 
 
-def test_arguments_that_the_environment_refuses_are_named_before_a_folder_is_made(
-    quick_ppo, tmp_path
-):
-    with pytest.raises(UsageError, match=r"Test/Reach-v0 refuses .*'denze', should be"):
+def test_invalid_arguments_are_reported_before_a_folder_is_created(quick_ppo, tmp_path):
+    with pytest.raises(UsageError, match=r"Test/Reach-v0 rejects .*'denze', should be"):
         train(quick_ppo.replace(env_kwargs={"reward_type": "denze"}), tmp_path, quiet=True)
     with pytest.raises(UsageError, match="device is 'gpu'"):
         train(quick_ppo, tmp_path, device="gpu", quiet=True)
     assert not list(tmp_path.iterdir())
 
 
-def test_learning_curve_is_a_small_picture(quick_ppo, tmp_path):
+def test_plot_of_a_learning_curve_is_small(quick_ppo, tmp_path):
     result = train(quick_ppo, tmp_path, quiet=True)
     rows = read_learning_curve(result.folder)
     assert rows[-1]["time/total_timesteps"] == 160
     assert rows[-1]["time/wall_time"] > 0
-    picture = plot_learning_curves([result.folder])
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size < 300_000
+    image = plot_learning_curves([result.folder])
+    assert image.read_bytes().startswith(b"\x89PNG")
+    assert image.stat().st_size < 300_000
 
 
-def test_learning_curve_of_nothing_is_refused(quick_ppo, tmp_path):
+def test_run_without_a_learning_curve_raises(quick_ppo, tmp_path):
     result = train(quick_ppo, tmp_path, quiet=True)
     result.folder.progress.write_text("time/total_timesteps,time/wall_time\n80,1.0\n")
     with pytest.raises(UsageError, match="no row with a success rate"):

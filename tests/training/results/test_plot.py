@@ -1,4 +1,4 @@
-"""Learning curves of several seeds in one picture."""
+"""Plots of learning curves, of one run or several seeds."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ HEADER = "time/total_timesteps,time/wall_time,rollout/success_rate\n"
 
 
 def learned(tmp_path: Path, config: TrainConfig, rows: str) -> RunFolder:
-    """A run with that learning curve."""
+    """A run with the given learning curve."""
     folder = create_run_folder(tmp_path, config)
     folder.progress.write_text(HEADER + rows)
     return folder
@@ -30,28 +30,28 @@ def seeds(tmp_path, quick_ppo) -> list[RunFolder]:
     ]
 
 
-def test_mean_and_band_reach_as_far_as_all_lines_do():
+def test_mean_and_range_cover_the_common_range():
     lines = [([0.0, 2.0], [0.0, 20.0]), ([1.0, 3.0], [30.0, 50.0])]
-    places, mean, lowest, highest = mean_and_spread(lines)
-    assert (places[0], places[-1]) == (1.0, 2.0)
-    np.testing.assert_allclose(lowest, 10 * places)
-    np.testing.assert_allclose(highest, 20 + 10 * places)
-    np.testing.assert_allclose(mean, 10 + 10 * places)
+    points, mean, lowest, highest = mean_and_spread(lines)
+    assert (points[0], points[-1]) == (1.0, 2.0)
+    np.testing.assert_allclose(lowest, 10 * points)
+    np.testing.assert_allclose(highest, 20 + 10 * points)
+    np.testing.assert_allclose(mean, 10 + 10 * points)
 
 
-def test_lines_that_share_no_stretch_have_no_mean():
+def test_lines_without_a_common_range_have_no_mean():
     assert mean_and_spread([([0.0, 1.0], [0, 1]), ([1.0, 2.0], [0, 1])]) is None
 
 
-def test_several_seeds_make_a_picture_beside_their_folders(seeds, tmp_path):
+def test_plot_of_several_seeds_is_next_to_their_folders(seeds, tmp_path):
     for folders in (seeds, seeds[:2]):
-        picture = plot_learning_curves(folders)
-        assert picture == tmp_path / "ppo" / "Test-Reach-v0_learning_curves.png"
-        assert picture.read_bytes().startswith(b"\x89PNG")
-        assert picture.stat().st_size < 300_000
+        image = plot_learning_curves(folders)
+        assert image == tmp_path / "ppo" / "Test-Reach-v0_learning_curves.png"
+        assert image.read_bytes().startswith(b"\x89PNG")
+        assert image.stat().st_size < 300_000
 
 
-def test_the_command_takes_one_run_or_several(seeds, tmp_path, capsys):
+def test_command_accepts_one_run_or_several(seeds, tmp_path, capsys):
     words = ["plot", *(str(folder.path) for folder in seeds)]
     out = tmp_path / "curves" / "all.png"
     assert cli.main([*words, "-o", str(out)]) == 0
@@ -60,7 +60,7 @@ def test_the_command_takes_one_run_or_several(seeds, tmp_path, capsys):
     assert capsys.readouterr().out == f"{seeds[0].path / 'learning_curve.png'}\n"
 
 
-def test_runs_of_different_kinds_are_refused_by_name(seeds, tmp_path, quick_ppo, quick_sac):
+def test_runs_that_differ_in_more_than_their_seed_raise(seeds, tmp_path, quick_ppo, quick_sac):
     rows = "80,1,0.1\n160,2,0.5\n"
     other = quick_ppo.replace(env_kwargs={"reward_type": "sparse"})
     sac = learned(tmp_path, quick_sac, rows)
@@ -68,7 +68,7 @@ def test_runs_of_different_kinds_are_refused_by_name(seeds, tmp_path, quick_ppo,
     for folder, complaint in (
         (sac, r"algorithm of .*sac.Test-Reach-v0_1 is 'sac', but .*ppo.Test-Reach-v0_1 has 'ppo'"),
         (learned(tmp_path, elsewhere, rows), "environment of .* is 'RigidEnvs/Push-v0', but"),
-        (learned(tmp_path, other, rows), "env_kwargs of .*'sparse'.* differ by their seed only"),
+        (learned(tmp_path, other, rows), "env_kwargs of .*'sparse'.* differ only in their seed"),
         (seeds[0], "is given twice"),
     ):
         with pytest.raises(UsageError, match=complaint):
@@ -84,7 +84,7 @@ def test_runs_of_different_kinds_are_refused_by_name(seeds, tmp_path, quick_ppo,
         ("\0\xff", r"progress\.csv"),
     ],
 )
-def test_a_run_without_a_curve_is_named(seeds, content, complaint):
+def test_run_without_a_learning_curve_raises(seeds, content, complaint):
     last = seeds[-1]
     last.progress.unlink()
     if content is not None:

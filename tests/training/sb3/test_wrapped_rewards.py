@@ -1,4 +1,4 @@
-"""Learners see the rewards of wrapped environments, relabelled ones too."""
+"""Training uses the rewards of wrapped environments, also for relabelled transitions."""
 
 import re
 
@@ -15,7 +15,7 @@ from stable_baselines3.her import HerReplayBuffer
 from rigid_envs import wrappers
 from rigid_envs.wrappers import Stage, goal_potential
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import load_config
+from training.settings.config_file import load_config
 from training.settings.environments import make_training_env, make_vector_env
 from training.settings.errors import UsageError
 
@@ -38,7 +38,7 @@ def her(env, **buffer):
     )
 
 
-def test_hindsight_relabels_with_the_wrapped_reward():
+def test_her_relabels_with_the_wrapped_reward():
     envs = wrappers.vector.SuccessBonus(make_vector_env(PUSH, WORLDS), 5.0)
     envs = wrappers.vector.ScaleReward(wrappers.vector.TimePenalty(envs, 0.5), 2.0)
     model = her(VecMonitor(RigidVecEnv(envs)))
@@ -47,14 +47,14 @@ def test_hindsight_relabels_with_the_wrapped_reward():
     assert set(np.unique(rewards)) == {-3.0, 10.0}
 
 
-def test_hindsight_is_told_why_a_reward_can_not_be_relabelled():
+def test_reward_that_her_cannot_recompute_raises():
     envs = wrappers.vector.PotentialShaping(make_vector_env(PUSH, WORLDS), goal_potential, 0.98)
     model = her(VecMonitor(RigidVecEnv(envs)))
     with pytest.raises(ValueError, match=r"PotentialShaping.* HER .*leave PotentialShaping out"):
         model.learn(EPISODE * WORLDS + 20)
 
 
-def test_hindsight_that_keeps_infos_relabels_costs_of_actions():
+def test_her_with_infos_recomputes_costs_of_actions():
     env = make_vec_env(PUSH, 2, wrapper_class=wrappers.ActionPenalty, wrapper_kwargs={"weight": 1})
     model = her(env, copy_info_dict=True)
     model.learn(EPISODE * 2 + 20)
@@ -80,7 +80,7 @@ def test_hindsight_that_keeps_infos_relabels_costs_of_actions():
     ],
 )
 @pytest.mark.parametrize("kind", ["sparse", "dense"])
-def test_stable_baselines3s_checker_finds_nothing(name, arguments, kind):
+def test_stable_baselines3_s_checker_passes(name, arguments, kind):
     check_env(getattr(wrappers, name)(gym.make(PUSH, reward_type=kind), **arguments))
 
 
@@ -96,7 +96,7 @@ BONUS = "rigid_envs.wrappers.SuccessBonus"
         ([{PENALTY: {"weight": 0.5}}, {BONUS: {"bonus": 2.0}}, {PENALTY: {"weight": 1}}], -4.5),
     ],
 )
-def test_configured_wrappers_are_those_of_vectors(write_yaml, entry, paid):
+def test_configured_wrappers_are_their_vector_versions(write_yaml, entry, paid):
     settings = {"n_timesteps": 100, "n_envs": 3, "env_wrapper": entry}
     path = write_yaml(yaml.safe_dump({PUSH: settings}))
     config = load_config("ppo", PUSH, path)
@@ -119,14 +119,14 @@ def test_configured_wrappers_are_those_of_vectors(write_yaml, entry, paid):
         (3, "should be NAME, "),
     ],
 )
-def test_other_wrappers_are_named(write_yaml, entry, complaint):
+def test_invalid_wrappers_raise(write_yaml, entry, complaint):
     path = write_yaml(yaml.safe_dump({PUSH: {"n_timesteps": 100, "env_wrapper": entry}}))
     with pytest.raises(UsageError, match=re.escape(complaint)):
         load_config("ppo", PUSH, path)
 
 
-def test_what_a_wrapper_refuses_is_named(write_yaml):
+def test_invalid_arguments_of_a_wrapper_raise(write_yaml):
     entry = {PENALTY: {"weight": -1.0}}
     path = write_yaml(yaml.safe_dump({PUSH: {"n_timesteps": 100, "env_wrapper": entry}}))
-    with pytest.raises(UsageError, match=r"env_wrapper .*ActionPenalty refuses .*weight"):
+    with pytest.raises(UsageError, match=r"env_wrapper: .*ActionPenalty rejects .*weight"):
         make_training_env(load_config("ppo", PUSH, path), {})

@@ -1,8 +1,14 @@
+"""Settings files: valid settings are read, and mistakes name key, value and valid values."""
+
 import dataclasses
 
+import gymnasium as gym
 import pytest
 
-from training.settings.config import ALGORITHMS, PPOConfig, load_config
+import rigid_envs  # noqa: F401  (registers the ids)
+from training.settings.config import ALGORITHMS, PPOConfig
+from training.settings.config_file import load_config
+from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError, nearest
 
 ENV = "RigidEnvs/Push-v0"
@@ -25,6 +31,37 @@ def test_sparse_push_learns_with_hindsight():
     assert config.replay_buffer_class == "HerReplayBuffer"
 
 
+@pytest.mark.parametrize("task", ["Push", "Stack", "Throw"])
+def test_dense_id_has_the_settings_of_the_plain_id(task):
+    plain = load_config("ppo", f"RigidEnvs/{task}-v0")
+    dense = load_config("ppo", f"RigidEnvs/{task}Dense-v0")
+    assert dense.env_id == f"RigidEnvs/{task}Dense-v0"
+    assert dense.as_mapping() == plain.as_mapping()
+
+
+def test_dense_id_does_not_have_settings_for_the_sparse_reward():
+    with pytest.raises(UsageError, match=r"no settings for environment 'RigidEnvs/PushDense-v0'"):
+        load_config("sac", "RigidEnvs/PushDense-v0")
+
+
+def test_own_settings_of_a_dense_id_take_precedence(write_yaml):
+    dense = dense_id(ENV)
+    plain = "{n_timesteps: 10, env_kwargs: {reward_type: dense}}"
+    file = write_yaml(f"{ENV}: {plain}\n{dense}: {{n_timesteps: 20}}")
+    assert load_config("ppo", dense, file).n_timesteps == 20
+    assert load_config("ppo", ENV, file).n_timesteps == 10
+
+
+def test_every_registered_task_has_a_plain_and_a_dense_id():
+    ids = [env_id for env_id in gym.registry if env_id.startswith("RigidEnvs/")]
+    for env_id in ids:
+        plain, dense = plain_id(env_id), dense_id(env_id)
+        assert {plain, dense} <= set(ids)
+        assert (plain_id(plain), dense_id(dense)) == (plain, dense)
+        registered = {**gym.spec(plain).kwargs, "reward_type": "dense"}
+        assert gym.spec(dense).kwargs == registered
+
+
 @pytest.mark.parametrize("algo", ALGORITHMS)
 def test_settings_survive_writing_and_reading(algo, write_yaml):
     config = load_config(algo, ENV)
@@ -41,11 +78,13 @@ def test_every_field_has_a_docstring(kind):
         assert declaration.lstrip().startswith('"""'), field.name
 
 
-def test_a_target_stands_among_the_settings_or_beside_them(write_yaml):
-    among = f"{ENV}: {{n_timesteps: 10, target_success_rate: 0.9}}"
-    beside = f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: {{{ENV}: 0.9}}"
-    assert load_config("ppo", ENV, write_yaml(among)) == load_config("ppo", ENV, write_yaml(beside))
-    assert load_config("ppo", ENV, write_yaml(among)).target_success_rate == 0.9
+def test_target_is_a_setting_or_a_top_level_section(write_yaml):
+    inside = f"{ENV}: {{n_timesteps: 10, target_success_rate: 0.9}}"
+    section = f"{ENV}: {{n_timesteps: 10}}\ntarget_success_rate: {{{ENV}: 0.9}}"
+    assert load_config("ppo", ENV, write_yaml(inside)) == load_config(
+        "ppo", ENV, write_yaml(section)
+    )
+    assert load_config("ppo", ENV, write_yaml(inside)).target_success_rate == 0.9
 
 
 @pytest.mark.parametrize(
@@ -68,12 +107,12 @@ def test_a_target_stands_among_the_settings_or_beside_them(write_yaml):
         (f"target_success_rate: {{{ENV}: 1}}", "should be a mapping from environment ids"),
     ],
 )
-def test_wrong_targets_are_named(write_yaml, text, complaint):
+def test_invalid_target_raises(write_yaml, text, complaint):
     with pytest.raises(UsageError, match=complaint):
         load_config("ppo", ENV, write_yaml(text))
 
 
-def test_training_is_seeded_unless_a_file_says_otherwise(write_yaml):
+def test_seed_is_0_by_default_and_may_be_null(write_yaml):
     assert load(write_yaml, "{n_timesteps: 10}").seed == 0
     assert load(write_yaml, "{n_timesteps: 10, seed: null}").seed is None
 
@@ -86,7 +125,7 @@ def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
 
 
 @pytest.mark.parametrize(
-    ("setting", "right"),
+    ("setting", "valid"),
     [
         ("n_envs: true", "an integer of at least 1"),
         ("n_envs: 0", "an integer of at least 1"),
@@ -98,7 +137,7 @@ def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
         ("gamma: .nan", "a number above 0 and at most 1"),
         ("gamma: 1.01", "a number above 0 and at most 1"),
         ("gamma: false", "a number above 0 and at most 1"),
-        ("gae_lambda: -0.1", "a number at least 0 and at most 1"),
+        ("gae_lambda: -0.1", "a number of at least 0 and at most 1"),
         ("learning_rate: 3e-4", "write 3.0e-4"),
         ("learning_rate: 0", "a number above 0"),
         ("learning_rate: lin_x", "lin_3e-4"),
@@ -108,8 +147,8 @@ def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
         ('normalize: "yes"', "true or false"),
         ("policy: MultiInputPolicee", "did you mean 'MultiInputPolicy'?"),
         ("policy_kwargs: dict(net_arch=[64, 64])", "a mapping"),
-        ("policy_kwargs: {net_arch: 64}", "net_arch to be a list of layer widths"),
-        ("policy_kwargs: {net_arch: [64, 0]}", "net_arch to be a list of layer widths"),
+        ("policy_kwargs: {net_arch: 64}", "in which net_arch is a list of layer widths"),
+        ("policy_kwargs: {net_arch: [64, 0]}", "in which net_arch is a list of layer widths"),
         ("policy_kwargs: {activation: thanh}", "did you mean 'tanh'?"),
         ("policy_kwargs: {net_arc: [64]}", "did you mean 'net_arch'"),
         ("env_kwargs: [dense]", "a mapping"),
@@ -119,13 +158,13 @@ def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
         ("batch_size: 1", "an integer of at least 2"),
     ],
 )
-def test_wrong_value_names_key_value_file_and_what_would_be_right(setting, right, write_yaml):
+def test_invalid_value_names_key_value_file_and_valid_values(setting, valid, write_yaml):
     key = setting.split(":")[0]
     timesteps = "" if key == "n_timesteps" else "n_timesteps: 100\n  "
     with pytest.raises(UsageError) as caught:
         load(write_yaml, f"\n  {timesteps}{setting}")
     message = str(caught.value)
-    for part in ("settings.yaml", ENV, f"{key} is ", "should be", right):
+    for part in ("settings.yaml", ENV, f"{key} is ", "should be", valid):
         assert part in message
 
 
@@ -135,7 +174,7 @@ def test_entropy_coefficient_of_sac_may_be_learned(value, write_yaml):
 
 
 @pytest.mark.parametrize("value", ["automatic", "auto_", "auto_x", "-0.1"])
-def test_entropy_coefficient_otherwise_is_refused(value, write_yaml):
+def test_other_entropy_coefficients_raise(value, write_yaml):
     with pytest.raises(UsageError, match=r'ent_coef is .*should be .*"auto"'):
         load(write_yaml, f"{{n_timesteps: 100, ent_coef: {value}}}", "sac")
 
@@ -144,48 +183,51 @@ def test_large_counts_may_be_written_as_floats(write_yaml):
     assert load(write_yaml, "{n_timesteps: !!float 1e6}").n_timesteps == 1_000_000
 
 
-def test_a_key_beside_the_environments_is_one_that_is_known(write_yaml):
+def test_unknown_top_level_section_raises(write_yaml):
     file = write_yaml(f"{ENV}: {{n_timesteps: 100}}\ntarget_succes_rate: {{{ENV}: 0.5}}\n")
     with pytest.raises(UsageError, match=r"'target_succes_rate' is neither .* did you mean 'targ"):
         load_config("ppo", ENV, file)
 
 
-def test_names_are_known_in_whatever_case():
+def test_nearest_name_ignores_case():
     assert nearest("PPO", ["sac", "ppo"]) == "ppo"
 
 
-def test_missing_length_of_training_is_named(write_yaml):
+def test_missing_n_timesteps_raises(write_yaml):
     with pytest.raises(UsageError, match="n_timesteps is missing"):
         load(write_yaml, "{n_envs: 8}")
 
 
-def test_batch_larger_than_the_rollout_is_refused(write_yaml):
+def test_batch_larger_than_the_rollout_raises(write_yaml):
     with pytest.raises(UsageError, match=r"batch_size is 64, should be at most .* = 20"):
         load(write_yaml, "{n_timesteps: 100, n_envs: 2, n_steps: 10, batch_size: 64}")
 
 
-def test_hindsight_settings_without_hindsight_are_refused(write_yaml):
-    with pytest.raises(UsageError, match="replay_buffer_class: HerReplayBuffer"):
+def test_her_settings_without_her_raise(write_yaml):
+    with pytest.raises(
+        UsageError, match="replay_buffer_kwargs requires replay_buffer_class: HerReplayBuffer"
+    ):
         load(write_yaml, "{n_timesteps: 100, replay_buffer_kwargs: {n_sampled_goal: 4}}", "sac")
 
 
-def test_hindsight_and_guides_are_refused_together(write_yaml):
-    text = "{n_timesteps: 100, replay_buffer_class: HerReplayBuffer, env_kwargs: {guided: true}}"
-    with pytest.raises(UsageError, match=r"env_kwargs has guided: true, should be without"):
+def test_her_with_an_observed_guide_raises(write_yaml):
+    guide = "{observe_task_guide: true}"
+    text = f"{{n_timesteps: 100, replay_buffer_class: HerReplayBuffer, env_kwargs: {guide}}}"
+    with pytest.raises(UsageError, match="observe_task_guide cannot be used with HerReplayBuffer"):
         load(write_yaml, text, "sac")
-    assert load(write_yaml, text.replace("guided: true", "guided: false"), "sac")
+    assert load(write_yaml, text.replace("true", "false"), "sac")
 
 
 @pytest.mark.parametrize("name", ["ActionPenalty", "SmoothnessPenalty"])
-def test_hindsight_and_penalties_on_actions_are_refused_together(write_yaml, name):
+def test_her_with_a_penalty_on_actions_raises(write_yaml, name):
     wrapper = f"{{rigid_envs.wrappers.{name}: {{weight: 0.1}}}}"
     text = f"{{n_timesteps: 100, env_wrapper: {wrapper}, replay_buffer_class: HerReplayBuffer}}"
-    with pytest.raises(UsageError, match=rf"env_wrapper has .*{name}, should be without"):
+    with pytest.raises(UsageError, match=rf"{name} cannot be used with HerReplayBuffer"):
         load(write_yaml, text, "sac")
     assert load(write_yaml, text.replace("HerReplayBuffer", "null"), "sac")
 
 
-def test_unknown_algorithm_and_environment_name_the_nearest():
+def test_unknown_algorithm_and_environment_suggest_the_nearest():
     with pytest.raises(UsageError, match=r"'pp0'; did you mean 'ppo'\?"):
         load_config("pp0", ENV)
     with pytest.raises(UsageError, match=r"'Push-v0'; did you mean 'RigidEnvs/Push-v0'\?"):
@@ -203,17 +245,17 @@ def test_unknown_algorithm_and_environment_name_the_nearest():
         (f"{ENV}: !!python/object/apply:os.getcwd []", "not valid YAML"),
     ],
 )
-def test_damaged_file_is_named(text, complaint, write_yaml):
+def test_damaged_file_raises(text, complaint, write_yaml):
     with pytest.raises(UsageError, match=rf"settings\.yaml: .*{complaint}|{complaint}"):
         load_config("ppo", ENV, write_yaml(text))
 
 
-def test_missing_file_is_named(tmp_path):
-    with pytest.raises(UsageError, match=r"none\.yaml: No such file"):
+def test_missing_file_raises(tmp_path):
+    with pytest.raises(UsageError, match=r"none\.yaml does not exist; it should be a YAML file"):
         load_config("ppo", ENV, tmp_path / "none.yaml")
 
 
-def test_changes_are_checked_like_a_file(quick_ppo):
+def test_replaced_values_are_validated(quick_ppo):
     assert quick_ppo.replace(n_envs=4).n_envs == 4
     with pytest.raises(UsageError, match=r"command line: .*n_envs is 0"):
         quick_ppo.replace(n_envs=0)

@@ -1,4 +1,4 @@
-"""The last part of a run on other arguments of the environment, as on finer physics."""
+"""The fine-tuning stage: the last part of a run, with other arguments of the environment."""
 
 import warnings
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from stable_baselines3.her import HerReplayBuffer
 from training.sb3.vec_env import RigidVecEnv
 
 
-class FinishElsewhere(BaseCallback):
-    """Puts other worlds in the place of those trained on, between two updates.
+class FineTuning(BaseCallback):
+    """Replaces the environments between two updates.
 
-    Networks, statistics and replay buffer go on. Success counts anew, so that early stopping is
-    judged on the worlds that the run finishes on.
+    Networks, statistics and replay buffer are kept. The success rate is measured again from zero
+    episodes, so that early stopping depends on episodes of this stage only.
 
     Args:
-        worlds: Whose environments are replaced.
-        make: Makes the others.
-        from_steps: Steps from which on they are trained on.
-        seed: Of their first episodes.
+        worlds: The adapter whose environments are replaced.
+        make: Makes the new environments.
+        from_steps: Number of steps after which the stage starts.
+        seed: Seed of its first episodes.
     """
 
     def __init__(
@@ -30,23 +30,23 @@ class FinishElsewhere(BaseCallback):
     ):
         super().__init__()
         self.worlds, self.make, self.from_steps, self.seed = worlds, make, from_steps, seed
-        self.finishing, self.resumed = False, False
+        self.started, self.resumed = False, False
 
     def _on_training_start(self) -> None:
         self.resumed = self.model.num_timesteps > self.from_steps
 
     def _on_rollout_start(self) -> None:
-        if self.finishing or self.model.num_timesteps < self.from_steps:
+        if self.started or self.model.num_timesteps < self.from_steps:
             return
-        self.finishing = True
+        self.started = True
         self.worlds.replace(self.make())
         model: Any = self.model
         buffer = getattr(model, "replay_buffer", None)
         if isinstance(buffer, HerReplayBuffer):
-            with warnings.catch_warnings():  # of what is meant: these episodes are never to end
+            with warnings.catch_warnings():  # it warns that the episodes are cut off, as intended
                 warnings.simplefilter("ignore")
                 buffer.truncate_last_trajectory()
-        if not self.resumed:  # else these episodes would be played again
+        if not self.resumed:  # a resumed run would repeat the episodes of this seed
             self.worlds.seed(self.seed)
             model.ep_success_buffer.clear()
             model.ep_info_buffer.clear()

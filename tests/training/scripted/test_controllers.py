@@ -1,0 +1,27 @@
+"""Scripted controllers: found by task, and they solve nearly all episodes."""
+
+import gymnasium as gym
+import pytest
+
+from training.policies.policy import scripted_policy
+from training.results.evaluate import evaluate
+from training.scripted import CONTROLLERS, controller_for
+from training.settings.errors import UsageError
+
+
+def test_all_ids_of_a_task_have_the_same_controller():
+    ids = [env_id for env_id in gym.registry if env_id.startswith("RigidEnvs/")]
+    assert {controller_for(env_id) for env_id in ids} == set(CONTROLLERS.values())
+    for task in ("Push", "Stack", "Throw"):
+        found = controller_for(f"RigidEnvs/{task}Dense-v0")
+        assert found is controller_for(f"RigidEnvs/{task}-v0") is CONTROLLERS[task.lower()]
+
+
+def test_environment_without_controller_raises(reach):
+    with pytest.raises(UsageError, match=f"no scripted controller for environment '{reach}'"):
+        controller_for(reach)
+
+
+def test_controller_of_push_solves_nearly_all_episodes():
+    policy = scripted_policy("RigidEnvs/Push-v0")
+    assert evaluate(policy, 100, quiet=True).success_at_end.mean() >= 0.97

@@ -1,0 +1,35 @@
+"""The packages of each optional extra, and an error that names the extra to install."""
+
+import importlib.util
+from collections.abc import Sequence
+
+from training.settings.errors import UsageError
+
+TRAIN_EXTRA = (
+    "stable_baselines3",
+    "torch",
+    "yaml",
+    "rich",
+    "tensorboard",
+    "matplotlib",
+    "imageio",
+    "imageio_ffmpeg",
+    "PIL",
+)
+RENDER_EXTRA = ("pygame",)
+TUNE_EXTRA = (*TRAIN_EXTRA, "optuna")
+
+
+def require(extra: str, modules: Sequence[str]) -> None:
+    """Raises UsageError if a module is not installed.
+
+    Args:
+        extra: The extra of the project that installs the modules.
+        modules: Names of the modules that the command imports.
+    """
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"this command requires {', '.join(missing)}; "
+            f'to install: pip install "rigid-envs[{extra}]"'
+        )

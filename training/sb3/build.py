@@ -1,0 +1,147 @@
+"""Builds the worlds and the Stable-Baselines3 model that the settings describe."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import torch
+from gymnasium import spaces
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+from stable_baselines3.her import HerReplayBuffer
+
+from training.policies.bounded import BoundedPolicy
+from training.policies.offsets import OffsetPolicy
+from training.sb3.vec_env import RigidVecEnv
+from training.settings.config import (
+    BOUNDED_POLICY,
+    OFFSET_POLICY,
+    PPOConfig,
+    SACConfig,
+    TrainConfig,
+)
+from training.settings.environments import make_training_env
+from training.settings.errors import UsageError
+
+SUCCESS_WINDOW = 1000
+"""Least number of episodes over which the success rate of training is measured."""
+POLICIES: dict[str, type[BasePolicy]] = {
+    BOUNDED_POLICY: BoundedPolicy,
+    OFFSET_POLICY: OffsetPolicy,
+}
+ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
+
+
+class LinearSchedule:
+    """A value that falls linearly to zero over the run."""
+
+    def __init__(self, start: float):
+        self.start = start
+
+    def __call__(self, progress_remaining: float) -> float:
+        """The value when this fraction of the run remains."""
+        return progress_remaining * self.start
+
+
+@contextmanager
+def worlds_and_model(
+    config: TrainConfig, device: str, num_threads: int | None
+) -> Iterator[tuple[RigidVecEnv, BaseAlgorithm]]:
+    """The worlds and the model of a run; afterwards closes the worlds.
+
+    Args:
+        config: The settings.
+        device: Torch device of the networks.
+        num_threads: Number of torch threads meanwhile; by default at most 2.
+
+    Raises:
+        UsageError: The environment rejects its arguments, or the device does not exist.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
+    worlds = RigidVecEnv(make_training_env(config, config.env_kwargs))
+    try:
+        yield worlds, _model(config, _wrapped(worlds, config), _checked_device(device))
+    finally:
+        torch.set_num_threads(threads)
+        worlds.close()
+
+
+def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
+    monitored = VecMonitor(worlds)
+    if not config.normalize:
+        return monitored
+    if config.algo == "ppo":
+        return VecNormalize(monitored, gamma=config.gamma)
+    # SAC: rewards are not scaled, because old transitions would get the statistics of the time at
+    # which they are sampled. Goals are not scaled, because achieved and desired goals with
+    # different scales could not be compared.
+    goals = isinstance(monitored.observation_space, spaces.Dict)
+    return VecNormalize(
+        monitored, norm_reward=False, norm_obs_keys=["observation"] if goals else None
+    )
+
+
+def _model(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
+    common: dict[str, Any] = {
+        "policy": POLICIES.get(config.policy, config.policy),
+        "env": env,
+        "learning_rate": _schedule(config.learning_rate),
+        "batch_size": config.batch_size,
+        "gamma": config.gamma,
+        "policy_kwargs": _policy_kwargs(config.policy_kwargs),
+        "stats_window_size": max(SUCCESS_WINDOW, config.n_envs),
+        "seed": config.seed,
+        "device": device,
+    }
+    if isinstance(config, PPOConfig):
+        return PPO(
+            **common,
+            n_steps=config.n_steps,
+            n_epochs=config.n_epochs,
+            gae_lambda=config.gae_lambda,
+            ent_coef=config.ent_coef,
+            vf_coef=config.vf_coef,
+            max_grad_norm=config.max_grad_norm,
+            clip_range=_schedule(config.clip_range),
+            target_kl=config.target_kl,
+        )
+    assert isinstance(config, SACConfig)
+    return SAC(
+        **common,
+        buffer_size=config.buffer_size,
+        learning_starts=config.learning_starts,
+        train_freq=config.train_freq,
+        gradient_steps=config.gradient_steps,
+        tau=config.tau,
+        ent_coef=config.ent_coef,
+        replay_buffer_class=HerReplayBuffer if config.replay_buffer_class else None,
+        replay_buffer_kwargs=dict(config.replay_buffer_kwargs),
+    )
+
+
+def _schedule(value: float | str) -> float | LinearSchedule:
+    if isinstance(value, str):
+        return LinearSchedule(float(value.removeprefix("lin_")))
+    return value
+
+
+def _policy_kwargs(policy_kwargs: dict[str, Any]) -> dict[str, Any]:
+    """The configured network as arguments of Stable-Baselines3's policy."""
+    network = dict(policy_kwargs)
+    if "activation" in network:
+        network["activation_fn"] = ACTIVATIONS[network.pop("activation")]
+    return network
+
+
+def _checked_device(device: str) -> str:
+    try:
+        found = torch.device(device) if device != "auto" else None
+    except RuntimeError:
+        raise UsageError(f"device is {device!r}, should be auto, cpu or cuda") from None
+    if found is not None and found.type == "cuda" and not torch.cuda.is_available():
+        raise UsageError(f"device is {device!r}, but torch finds no such device; should be cpu")
+    return device
