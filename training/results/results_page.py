@@ -7,6 +7,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
+
 from training.results.result import Result, read_results
 from training.runs.run_folder import folder_name
 from training.settings.config import TrainConfig, load_config
@@ -33,6 +35,8 @@ evaluation; the share in the environments is what their steps took of it. Succes
 episodes whose goal is met when they end, success at any time those that met it after some step;
 intervals are Wilson's at 95 %. ± is the standard deviation over seeds.
 """
+README_WIDTH = 200
+"""Of a picture in the README, in pixels."""
 _PLACE = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
@@ -194,28 +198,63 @@ def _made_with(one: Result) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    """The block of the README: a row a kind, and the films."""
-    lines = [
-        "| task | algorithm | seeds | steps | wall time | success at the end | at any time |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    films = []
+    """The table of environments in the README: sizes, and results by algorithm."""
+    algorithms = list(dict.fromkeys(one.algorithm for one in results))
+    columns = ["environment", "", "observation", "action", "steps per episode"]
+    for algorithm in algorithms:
+        columns += [f"{algorithm.upper()}: success", "training time"]
+    lines = [" | ".join(columns), " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])]
+    environments: dict[str, list[list[Result]]] = {}
     for group in by_kind(results):
-        first = group[0]
-        extra = first.task.removeprefix(folder_name(first.env_id)).removeprefix("-")
-        cells = [
-            f"{first.env_id} {extra}".strip(),
-            first.algorithm.upper(),
-            str(len(group)),
-            _over_seeds(group, lambda one: one.steps / 1e6, "{:.2f}", " million"),
-            _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
-            _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
-            _over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-        film = pictures(first.kind)[1].as_posix()
-        films.append(f"![{first.env_id}, {first.algorithm.upper()}]({film})")
-    return "\n".join([*lines, "", *films, ""])
+        environments.setdefault(_environment(group[0]), []).append(group)
+    for groups in environments.values():
+        first = groups[0][0]
+        names = dict.fromkeys(_name(group[0]) for group in groups)
+        cells = ["<br>".join(names), _image(first), *_sizes(first.env_id)]
+        by_algorithm = {group[0].algorithm: group for group in groups}
+        for algorithm in algorithms:
+            cells += _outcome(by_algorithm.get(algorithm, []))
+        lines.append(" | ".join(cells))
+    return "\n".join([*(f"| {line} |" for line in lines), ""])
+
+
+def _environment(one: Result) -> str:
+    """A key that is the same for the sparse and the dense id of a task."""
+    task = gym.spec(one.env_id).kwargs.get("task", one.env_id)
+    return f"{task} {_changes(one)}"
+
+
+def _name(one: Result) -> str:
+    return f"{one.env_id} {_changes(one)}".strip()
+
+
+def _changes(one: Result) -> str:
+    """The arguments that make it another task."""
+    return one.task.removeprefix(folder_name(one.env_id)).removeprefix("-")
+
+
+def _image(one: Result) -> str:
+    film = pictures(one.kind)[1].as_posix()
+    return f'<img src="{film}" width="{README_WIDTH}" alt="{one.env_id}">'
+
+
+def _sizes(env_id: str) -> list[str]:
+    """Sizes of observation and action, and the steps of an episode."""
+    env = gym.make(env_id)
+    spaces: Any = env.observation_space, env.action_space
+    env.close()
+    observation, action = spaces[0]["observation"].shape[0], spaces[1].shape[0]
+    return [str(observation), str(action), str(gym.spec(env_id).max_episode_steps)]
+
+
+def _outcome(group: Sequence[Result]) -> list[str]:
+    """Success at the end and training time of runs that differ by their seed; of none, dashes."""
+    if not group:
+        return ["–", "–"]
+    success = _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %")
+    if statistics.fmean(one.seconds for one in group) < 100:
+        return [success, _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s")]
+    return [success, _over_seeds(group, lambda one: one.seconds / 60, "{:.1f}", " min")]
 
 
 def _short(commit: str | None) -> str:
