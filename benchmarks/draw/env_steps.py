@@ -30,5 +30,5 @@ def draw(table: Table, path: Path) -> None:
     axes.minorticks_off()
     axes.set_xlabel("worlds")
     axes.set_ylabel("environment steps per second")
-    axes.legend(frameon=False, loc="upper left", fontsize=9)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=9)
     write(figure, table, path)

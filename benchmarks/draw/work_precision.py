@@ -45,7 +45,7 @@ def draw(table: Table, path: Path) -> None:
                 )  # fmt: skip
     axes.set_xlabel("wall time per simulated second of one world, ms (one core)")
     axes.set_ylabel("relative error of the stopping distance")
-    axes.legend(frameon=False, fontsize=9)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=9)
     write(figure, table, path)
 
 
