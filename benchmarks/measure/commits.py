@@ -59,8 +59,10 @@ def unpack(commits: Sequence[str], folder: Path) -> dict[str, Path]:
         trees[commit] = tree = folder / name
         if not tree.exists():
             archive = _git("archive", name)
-            tree.mkdir(parents=True)
-            subprocess.run(["tar", "-x", "-C", tree], input=archive, check=True)
+            new = tree.with_name(f"{name}.new")  # so that an interrupted call leaves no half tree
+            new.mkdir(parents=True, exist_ok=True)
+            subprocess.run(["tar", "-x", "-C", new], input=archive, check=True)
+            new.rename(tree)
     return trees
 
 

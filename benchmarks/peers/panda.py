@@ -1,4 +1,4 @@
-"""panda-gym's PandaPush-v3 as a side: a process with an interpreter of its own."""
+"""panda-gym's PandaPush-v3 as a side, in a separate process with a separate interpreter."""
 
 from contextlib import AbstractContextManager
 from pathlib import Path

@@ -2,9 +2,9 @@
 
 usage: panda_push.py SECONDS [WORLDS]
 
-It needs panda-gym alone, so that it can run in a virtual environment of its own. For every line on
-its standard input it steps for SECONDS and prints the number of environment steps. More than one
-world is Gymnasium's AsyncVectorEnv, one process per world.
+It imports nothing of this project, so that it can run in a separate virtual environment. For every
+line on its standard input it steps for SECONDS and prints the number of environment steps. Several
+worlds run in Gymnasium's AsyncVectorEnv, with one process per world.
 """
 
 import sys
