@@ -1,1 +1,1 @@
-"""Speed and accuracy, measured beside a peer in the same run. Nothing imports this package."""
+"""Speed and accuracy, measured together with peers. No other package imports this one."""

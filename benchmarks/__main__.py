@@ -1,51 +1,73 @@
-"""All benchmarks in order, or those named: python -m benchmarks [--save] [name ...]."""
+"""Runs all benchmarks, or those named: python -m benchmarks [--save] [name ...]."""
 
 import argparse
-import json
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 
-from benchmarks import accuracy, features, memory, pictures, speed, startup, tradeoff
-from benchmarks.report import Table, circumstances, describe, plain
-from benchmarks.tables import RESULTS
+from benchmarks.measure import (
+    accuracy,
+    features,
+    memory,
+    presets,
+    rendering,
+    speed,
+    startup,
+    tradeoff,
+    work_precision,
+    worlds,
+)
+from benchmarks.report.provenance import describe, provenance
+from benchmarks.report.results_file import RESULTS, save
+from benchmarks.report.tables import Table, plain
 
-BENCHMARKS: dict[str, Callable[[], Iterator[Table]]] = {
-    "speed": speed.measure,
-    "startup": startup.measure,
-    "memory": memory.measure,
-    "pictures": pictures.measure,
-    "accuracy": accuracy.measure,
-    "features": features.measure,
-    "tradeoff": tradeoff.measure,
+MODULES = {
+    "speed": speed,
+    "worlds": worlds,
+    "presets": presets,
+    "startup": startup,
+    "memory": memory,
+    "rendering": rendering,
+    "accuracy": accuracy,
+    "features": features,
+    "tradeoff": tradeoff,
+    "work_precision": work_precision,
 }
 
 
 def run() -> None:
-    """Prints the header and all tables; --save also writes them to benchmarks/results.json."""
+    """Prints the tables; --save writes them to benchmarks/results.json as well."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(BENCHMARKS))
-    parser.add_argument("--save", action="store_true", help=f"write {RESULTS.name}; needs all")
-    parser.add_argument("--panda", type=Path, metavar="PYTHON", help="see benchmarks/peers")
-    words = parser.parse_args()
-    if unknown := [name for name in words.names if name not in BENCHMARKS]:
-        parser.error(f"unknown: {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    if words.save and words.names:
-        parser.error("--save takes no names: the figures of one file belong to one run")
-    chosen = {name: BENCHMARKS[name] for name in words.names or BENCHMARKS}
-    if "speed" in chosen:
-        chosen["speed"] = partial(speed.measure, words.panda)
+    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(MODULES))
+    parser.add_argument(
+        "--save", action="store_true",
+        help=f"write {RESULTS.name}: with names, the other tables in it are kept",
+    )  # fmt: skip
+    parser.add_argument(
+        "--panda", type=Path, metavar="PYTHON",
+        help="interpreter with panda-gym, see benchmarks/peers/README.md",
+    )  # fmt: skip
+    options = parser.parse_args()
+    if unknown := [name for name in options.names if name not in MODULES]:
+        parser.error(f"unknown benchmark: {', '.join(unknown)}; known: {', '.join(MODULES)}")
+    benchmarks: dict[str, Callable[[], Iterator[Table]]] = {
+        name: module.measure for name, module in MODULES.items()
+    }
+    for name, module in (("speed", speed), ("worlds", worlds)):
+        benchmarks[name] = partial(module.measure, options.panda)
 
-    now, tables = circumstances(), []
-    print(describe(now) + "\n")
-    for measure in chosen.values():
-        for table in measure():
+    this_run, tables = provenance(), []
+    print(describe(this_run))
+    for name in options.names or benchmarks:
+        start = perf_counter()
+        print(f"\n# {name}\n\n{MODULES[name].__doc__}")
+        for table in benchmarks[name]():
             print(plain(table) + "\n", flush=True)
-            tables.append(table._asdict())
-    if words.save:
-        RESULTS.write_text(
-            json.dumps({**now, "tables": tables}, indent=1, ensure_ascii=False) + "\n"
-        )
+            tables.append(table)
+        print(f"({perf_counter() - start:.0f} s)", flush=True)
+    if options.save:
+        save(tables, this_run, keep=bool(options.names))
         print(f"written: {RESULTS.parent.name}/{RESULTS.name}")
 
 

@@ -1,54 +1,58 @@
-"""Push's speed in this tree beside other commits: python -m benchmarks.commits COMMIT ...
+"""Compares this source tree with other commits: python -m benchmarks.commits COMMIT ...
 
-Each commit is unpacked into a folder of its own, compiled there, and runs in a process of its own
-with the packages that are installed here; processes take turns of an episode of 4,096 worlds at
-balanced. What a machine does meanwhile hits all sides alike, so differences of a few percent show
-after two minutes.
+By default it measures speed: Push, Stack and Throw with 4,096 worlds, dense reward and preset
+balanced. Each commit runs in its own process; processes take turns of one episode, so that other
+load on the machine hits all of them equally, and differences of a few percent show after a minute.
+With --states it checks that the physics is unchanged: random episodes of each task and preset are
+compared bit by bit, at every step.
 """
 
 import argparse
-import subprocess
-import sys
-from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.report import ROOT, THREADS, Table, against, elsewhere, main, take_turns
-
-ROUNDS, SECONDS = 120, 0.01  # an episode takes longer, so a turn is one
-HERE = "this tree"
-SCRIPT = Path(__file__).parent / "peers" / "push.py"
+from benchmarks.measure import commits
+from benchmarks.report.provenance import THREADS, describe, provenance
+from benchmarks.report.tables import plain
 
 
-def unpack(commit: str, tree: Path) -> Path:
-    """Puts the files of a commit into a new folder."""
-    archive = subprocess.run(["git", "archive", commit], cwd=ROOT, capture_output=True)
-    if archive.returncode:
-        raise SystemExit(f"{commit!r} can't be had from {ROOT}: {archive.stderr.decode().strip()}")
-    tree.mkdir()
-    subprocess.run(["tar", "-x", "-C", tree], input=archive.stdout, check=True)
-    return tree
-
-
-def measure(commits: list[str], threads: int) -> Iterator[Table]:
-    """One table: this tree and each commit, ratios to the first commit named."""
-    with TemporaryDirectory() as folder:
-        places = {commit: Path(folder) / str(n) for n, commit in enumerate(commits)}
-        trees = {HERE: ROOT} | {commit: unpack(commit, at) for commit, at in places.items()}
-        sides = {
-            name: elsewhere([sys.executable, SCRIPT, str(threads)], tree)
-            for name, tree in trees.items()
-        }
-        rates = take_turns(sides, ROUNDS, SECONDS)
-    columns = ["env steps a second", "median", f"ratio to {commits[0]}", "lowest", "highest"]
-    title = f"Push, balanced, 4,096 worlds, {threads} threads, {ROUNDS} turns of an episode each"
-    yield Table("commits", title, columns, against(rates, commits[0]))
+def run() -> None:
+    """Prints a table per task, or with --states a table per commit."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.commits", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("commits", nargs="+", metavar="COMMIT")
+    parser.add_argument("--states", action="store_true", help="compare episodes, not speed")
+    parser.add_argument(
+        "--tasks", nargs="+", choices=commits.TASKS, default=commits.TASKS, metavar="TASK",
+        help=f"{', '.join(commits.TASKS)}; give it after the commits",
+    )  # fmt: skip
+    parser.add_argument(
+        "--presets", nargs="+", choices=commits.PRESETS, default=commits.PRESETS, metavar="PRESET",
+        help=f"of --states: {', '.join(commits.PRESETS)}",
+    )  # fmt: skip
+    parser.add_argument("--threads", type=int, default=THREADS, help="of speed")
+    parser.add_argument("--worlds", type=int, default=commits.WORLDS, help="of speed")
+    parser.add_argument("--turns", type=int, help="episodes per commit and task, of speed")
+    parser.add_argument(
+        "--trees", type=Path, metavar="FOLDER",
+        help="keep the unpacked commits with their compiled kernels there, for the next call",
+    )  # fmt: skip
+    options = parser.parse_args()
+    print(f"{__doc__}\n{describe(provenance())}\n")
+    with TemporaryDirectory() as temporary:
+        folder = options.trees.resolve() if options.trees else Path(temporary)
+        trees = commits.unpack(list(dict.fromkeys(options.commits)), folder)
+        if options.states:
+            tables = commits.states(trees, options.tasks, options.presets)
+        else:
+            tables = commits.speed(
+                trees, options.threads, options.tasks, options.turns, options.worlds
+            )
+        for table in tables:
+            print(plain(table) + "\n", flush=True)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("commits", nargs="+", metavar="COMMIT")
-    parser.add_argument("--threads", type=int, default=THREADS)
-    words = parser.parse_args()
-    main(__doc__, partial(measure, list(dict.fromkeys(words.commits)), words.threads))
+    run()

@@ -1,30 +1,61 @@
 """Speed of panda-gym's PandaPush-v3: random actions, sparse reward, a reset after each episode.
 
-It needs only panda-gym and stands alone, to run in an environment of its own. At each line on its
-standard input it steps for as many seconds as its argument says and prints the number of steps.
+usage: panda_push.py SECONDS [WORLDS]
+
+It imports nothing of this project, so that it can run in a separate virtual environment. For every
+line on its standard input it steps for SECONDS and prints the number of environment steps. Several
+worlds run in Gymnasium's AsyncVectorEnv, with one process per world.
 """
 
 import sys
+from collections.abc import Callable
 from time import perf_counter
 
 import gymnasium as gym
+import numpy as np
 import panda_gym  # noqa: F401  (registers the environments)
 
+ID, EPISODE = "PandaPush-v3", 50
 
-def serve(seconds: float) -> None:
-    """Takes a turn at each line, until there are no more."""
-    env = gym.make("PandaPush-v3")
+
+def single() -> Callable[[int], None]:
+    """A function that makes the n-th step of one environment."""
+    env = gym.make(ID)
     env.reset(seed=0)
-    actions = [env.action_space.sample() for _ in range(50)]
+    actions = [env.action_space.sample() for _ in range(EPISODE)]
+
+    def step(n: int) -> None:
+        _, _, terminated, truncated, _ = env.step(actions[n % EPISODE])
+        if terminated or truncated:
+            env.reset()
+
+    return step
+
+
+def vector(worlds: int) -> Callable[[int], None]:
+    """A function that makes the n-th step of all environments; they reset by themselves."""
+    envs = gym.make_vec(ID, num_envs=worlds, vectorization_mode="async")
+    envs.reset(seed=0)
+    size = envs.single_action_space.shape or ()
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (EPISODE, worlds, *size)).astype(np.float32)
+
+    def step(n: int) -> None:
+        envs.step(actions[n % EPISODE])
+
+    return step
+
+
+def serve(seconds: float, worlds: int) -> None:
+    """Works for one turn per line of standard input."""
+    step = single() if worlds == 1 else vector(worlds)
     for _ in sys.stdin:
         steps, start = 0, perf_counter()
         while perf_counter() - start < seconds:
-            _, _, terminated, truncated, _ = env.step(actions[steps % 50])
+            step(steps)
             steps += 1
-            if terminated or truncated:
-                env.reset()
-        print("steps", steps, flush=True)
+        print("steps", steps * worlds, flush=True)
 
 
 if __name__ == "__main__":
-    serve(float(sys.argv[1]))
+    serve(float(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)

@@ -48,6 +48,8 @@ machine they give the same policy, otherwise a similar one.
 Intervals in parentheses are 95 % confidence intervals (Wilson). ± is the standard deviation over
 seeds.
 """
+README_IMAGE_WIDTH = 200
+"""Of an image in the README, in pixels."""
 _BLOCK = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
@@ -222,30 +224,65 @@ def _versions(one: Result) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    """The block of the README: a row for each kind, and the videos."""
-    lines = [
-        "| task | algorithm | seeds | steps | wall time | success at the end | at any time |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    videos = []
+    """The table of environments in the README: sizes, and results by algorithm."""
+    algorithms = list(dict.fromkeys(one.algorithm for one in results))
+    columns = ["environment", "", "observation", "action", "steps per episode"]
+    for algorithm in algorithms:
+        columns += [f"{algorithm.upper()}: success", "training time"]
+    lines = [" | ".join(columns), " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])]
+    environments: dict[str, list[list[Result]]] = {}
     for group in by_kind(results):
-        first = group[0]
-        plain, dense = plain_id(first.env_id), _dense_id_of(first)
-        name = plain if dense is None else f"{plain} ({dense.rpartition('/')[2]})"
-        arguments = first.task.removeprefix(folder_name(plain)).removeprefix("-")
-        cells = [
-            f"{name} {arguments}".strip(),
-            first.algorithm.upper(),
-            str(len(group)),
-            _over_seeds(group, lambda one: one.steps / 1e6, "{:.2f}", " million"),
-            _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
-            _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
-            _over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-        video = image_paths(first.kind)[1].as_posix()
-        videos.append(f"![{plain}, {first.algorithm.upper()}]({video})")
-    return "\n".join([*lines, "", *videos, ""])
+        environments.setdefault(_environment(group[0]), []).append(group)
+    for groups in environments.values():
+        first = groups[0][0]
+        names = dict.fromkeys(_name(group[0]) for group in groups)
+        cells = ["<br>".join(names), _image(first), *_sizes(first.env_id)]
+        by_algorithm = {group[0].algorithm: group for group in groups}
+        for algorithm in algorithms:
+            cells += _outcome(by_algorithm.get(algorithm, []))
+        lines.append(" | ".join(cells))
+    return "\n".join([*(f"| {line} |" for line in lines), ""])
+
+
+def _environment(one: Result) -> str:
+    """A key that is the same for the sparse and the dense id of a task."""
+    task = gym.spec(one.env_id).kwargs.get("task", one.env_id)
+    return f"{task} {_changes(one)}"
+
+
+def _name(one: Result) -> str:
+    plain, dense = plain_id(one.env_id), _dense_id_of(one)
+    name = plain if dense is None else f"{plain} ({dense.rpartition('/')[2]})"
+    return f"{name} {_changes(one)}".strip()
+
+
+def _changes(one: Result) -> str:
+    """The arguments that make it another task."""
+    return one.task.removeprefix(folder_name(plain_id(one.env_id))).removeprefix("-")
+
+
+def _image(one: Result) -> str:
+    video = image_paths(one.kind)[1].as_posix()
+    return f'<img src="{video}" width="{README_IMAGE_WIDTH}" alt="{one.env_id}">'
+
+
+def _sizes(env_id: str) -> list[str]:
+    """Sizes of observation and action, and the steps of an episode."""
+    env = gym.make(env_id)
+    spaces: Any = env.observation_space, env.action_space
+    env.close()
+    observation, action = spaces[0]["observation"].shape[0], spaces[1].shape[0]
+    return [str(observation), str(action), str(gym.spec(env_id).max_episode_steps)]
+
+
+def _outcome(group: Sequence[Result]) -> list[str]:
+    """Success at the end and training time of runs that differ by their seed; of none, dashes."""
+    if not group:
+        return ["–", "–"]
+    success = _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %")
+    if statistics.fmean(one.seconds for one in group) < 100:
+        return [success, _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s")]
+    return [success, _over_seeds(group, lambda one: one.seconds / 60, "{:.1f}", " min")]
 
 
 def _short(commit: str | None) -> str:

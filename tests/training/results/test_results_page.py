@@ -24,7 +24,7 @@ def test_page_and_readme_show_every_seed_and_the_mean(repository, runs):
     assert page.count("\n| 3 | 160 |") == page.count("\n| 4 | 160 |") == 1
     assert "\n| mean | 160 ± 0 |" in page
     readme = (repository / README).read_text()
-    assert readme.startswith("# name\n<!-- results -->\n| task |")
+    assert readme.startswith("# name\n<!-- results -->\n| environment |")
     assert readme.endswith("<!-- /results -->\nmore\n")
     assert "old" not in readme
     for suffix in ("png", "gif"):
@@ -93,7 +93,7 @@ def test_check_names_files_that_are_out_of_date(repository, runs, capsys):
     capsys.readouterr()
     for name, old, new in (
         ("docs/results.md", "| 160 |", "| 170 |"),
-        ("README.md", "0.00 ± 0.00 million", "0.01 million"),
+        ("README.md", "PPO: success", "PPO: failure"),
         (f"{PLACE}/result.json", '"steps": 160', '"steps": 170'),
     ):
         file = repository / name

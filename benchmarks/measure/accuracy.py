@@ -1,8 +1,8 @@
-"""Errors against closed forms, beside MuJoCo on the same scenes at the same steps.
+"""Errors against closed forms, ours by preset and MuJoCo's on the same scenes at the same steps.
 
-Both engines run through the same code. Ours by preset; MuJoCo with its default options and elliptic
-cones. MuJoCo has no coefficient of restitution, hence no figures there. Blocks and balls settle for
-1 s, then get their speed. All weigh 1 kg. Errors are relative unless a unit stands beside them.
+Both engines run through the same code; MuJoCo has its default options and elliptic friction cones.
+MuJoCo has no coefficient of restitution, so it has no figures there. Blocks and balls rest for 1 s
+before they get their speed. Each has a mass of 1 kg. Errors are relative unless a unit is given.
 """
 
 import math
@@ -11,8 +11,8 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.mujoco_scene import MujocoWorld
-from benchmarks.report import Cell, Table, main
+from benchmarks.peers.mujoco_scene import MujocoWorld
+from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity, Scene, World
 from physics.reference.measures import (
     BLOCK,
@@ -34,7 +34,7 @@ def _peer(step: float) -> str:
 
 
 def _engines() -> dict[str, Make]:
-    """Ours by preset, then MuJoCo at the step of each."""
+    """Ours by preset, then MuJoCo at the substep of each."""
 
     def ours(fidelity: Fidelity, scene: Scene) -> World:
         return World(scene, fidelity, threads=1)
@@ -48,31 +48,30 @@ def _engines() -> dict[str, Make]:
 
 
 def restitution_rows() -> Iterator[list[Cell]]:
-    """Worst errors of restitution by preset."""
+    """Largest errors of restitution by preset."""
     for e in (0.0, 0.25, 0.5, 0.75, 1.0):
         found = [rebounds(e, fidelity) for fidelity in PRESETS.values()]
         if e == 1.0:
-            worst = [float(np.max(x**2 - 1.0)) for x in found]
-            yield ["e = 1: energy gained", "1e-3 accurate, solid", *worst]
+            largest = [float(np.max(x**2 - 1.0)) for x in found]
+            yield ["e = 1: energy gained", "1e-3 accurate, solid", *largest]
         else:
-            worst = [float(np.max(np.abs(x - e))) for x in found]
-            what = "rebound, share of v" if e == 0.0 else "error of e"
-            yield [f"e = {e:g}: {what}", "1e-3 accurate, solid", *worst]
+            largest = [float(np.max(np.abs(x - e))) for x in found]
+            yield [f"e = {e:g}: error of e", "1e-3 accurate, solid", *largest]
 
 
 def drifts(world: World | MujocoWorld) -> list[Cell]:
-    """Worst relative drift of energy and of angular momentum over 10 s."""
+    """Largest relative drift of energy and of angular momentum over 10 s."""
     energy, momentum = world.kinetic_energy()[0], world.angular_momentum()[0].copy()
-    worst = np.zeros(2)
+    largest = np.zeros(2)
     for _ in range(100):
         world.advance(0.1)
-        turned = math.dist(world.angular_momentum()[0], momentum) / math.hypot(*momentum)
-        worst = np.maximum(worst, [abs(world.kinetic_energy()[0] / energy - 1.0), turned])
-    return [float(worst[0]), float(worst[1])]
+        change = math.dist(world.angular_momentum()[0], momentum) / math.hypot(*momentum)
+        largest = np.maximum(largest, [abs(world.kinetic_energy()[0] / energy - 1.0), change])
+    return [float(largest[0]), float(largest[1])]
 
 
 def measure() -> Iterator[Table]:
-    """All tables of this module."""
+    """Three tables: sliding and rolling, restitution, a tumbling box."""
     engines = _engines()
     tests: dict[tuple[str, str], Callable[[Make], float]] = {
         (f"{name} slides to rest from {v:g} m/s", "5e-4 balanced, 5e-5 accurate"): partial(
@@ -81,35 +80,32 @@ def measure() -> Iterator[Table]:
         for name, half_extents in (("cube", BLOCK), ("slab", SLAB))
         for v in (2.0, 0.5)
     }
-    tests["cube creeps on 20°, 60 s, m/s", "1e-9"] = creep
-    tests["cube accelerates on 28°", "1e-3"] = partial(acceleration, 28.0, 2)
-    tests["cube accelerates on 30°, 1st second", "–"] = partial(acceleration, 30.0, 1)
-    tests["cube accelerates on 30°, 2nd second", "–"] = partial(acceleration, 30.0, 2)
+    tests["cube creeps down 20°, 60 s, m/s", "1e-9"] = creep
+    tests["cube accelerates down 28°", "1e-3"] = partial(acceleration, 28.0, 2)
+    tests["cube accelerates down 30°, 1st second", "–"] = partial(acceleration, 30.0, 1)
+    tests["cube accelerates down 30°, 2nd second", "–"] = partial(acceleration, 30.0, 2)
     tests["ball slides, then rolls", "1e-3 balanced"] = roll
     rows: list[list[Cell]] = []
-    for (name, bar), test in tests.items():
+    for (name, target), test in tests.items():
         errors = {engine: test(make) for engine, make in engines.items()}
         step = PRESETS["balanced"].substep
         ours, theirs = errors["balanced"], errors[_peer(step)]
         ratio = theirs / ours if theirs < 1e6 * ours else "> 1e6"
-        rows.append([name, bar, *errors.values(), ratio])
-    columns = ["error", "bar", *engines, "MuJoCo / balanced"]
+        rows.append([name, target, *errors.values(), ratio])
+    columns = ["error", "target", *engines, "MuJoCo / balanced"]
     yield Table("accuracy", "Relative errors in sliding, resting, rolling; μ = 0.5", columns, rows)
 
-    title = f"Sphere on a plane without gravity, worst of {PHASES} touch phases"
-    yield Table("restitution", title, ["error", "bar", *PRESETS], list(restitution_rows()))
+    title = f"Sphere that hits a plane without gravity, largest of {PHASES} phases of the step"
+    yield Table("restitution", title, ["error", "target", *PRESETS], list(restitution_rows()))
 
     box = torque_free_box()
     worlds: dict[str, World | MujocoWorld] = {
-        "ours": World(box, Fidelity(substep=1e-3), threads=1),
+        "rigid-envs": World(box, Fidelity(substep=1e-3), threads=1),
         "MuJoCo, Euler": MujocoWorld(box, 1e-3),
         "MuJoCo, RK4": MujocoWorld(box, 1e-3, "RK4"),
     }
     rows = [[name, *drifts(world)] for name, world in worlds.items()]
-    rows.append(["bar", "1e-6", "round-off"])
+    rows.append(["target", "1e-6", "round-off"])
     title = "Torque-free box about its middle axis, 10 s at 1 ms"
-    yield Table("tumbling", title, ["worst drift", "energy", "angular momentum"], rows)
-
-
-if __name__ == "__main__":
-    main(__doc__, measure)
+    columns = ["largest relative drift", "energy", "angular momentum"]
+    yield Table("tumbling", title, columns, rows)

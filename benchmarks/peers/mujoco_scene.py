@@ -1,4 +1,4 @@
-"""The peer's side of a scene: a Scene of ours as a MuJoCo model, its options at their defaults."""
+"""One of our scenes as a MuJoCo model, with MuJoCo's default options."""
 
 import math
 from typing import Any
@@ -9,9 +9,7 @@ import numpy as np
 try:
     import mujoco
 except ModuleNotFoundError:
-    raise SystemExit(
-        "MuJoCo is measured beside: pip install -e '.[bench]', or make bench"
-    ) from None
+    raise SystemExit("MuJoCo is missing: pip install -e '.[bench]', or make bench") from None
 
 from physics import Body, Box, Capsule, Drive, Ground, Scene, Sphere, Static
 from physics.rotation import rotate, rotate_back
@@ -34,7 +32,7 @@ def _geom(parent: Element, name: str, shape: Shape, mass: float | None) -> None:
         assert isinstance(shape, Sphere)
         kind, size = "sphere", (shape.radius,)
     geom = SubElement(parent, "geom", name=name, type=kind, size=_text(*size))
-    geom.attrib.update(contype="0", conaffinity="0")  # pairs are listed one by one
+    geom.attrib.update(contype="0", conaffinity="0")  # contact pairs are listed
     if mass is not None:
         geom.set("mass", _text(mass))
 
@@ -44,9 +42,16 @@ def model_of(
 ) -> mujoco.MjModel:
     """A model of the same solids, masses, friction and gravity.
 
-    Bodies have free joints; a drive is a mocap body, which follows its path whatever it meets and
-    costs MuJoCo the least. Pairs are explicit, with the geometric mean of both frictions. MuJoCo
-    has no coefficient of restitution and no stiffness in our sense: those stay at its defaults.
+    Bodies have free joints. A drive is a mocap body: it follows its path whatever it meets, and
+    costs MuJoCo the least. Contact pairs are listed, with the geometric mean of both frictions.
+    MuJoCo has no coefficient of restitution and no contact stiffness in N/m: its own contact
+    parameters keep their defaults.
+
+    Args:
+        scene: solids and gravity.
+        timestep: s.
+        integrator: name of a MuJoCo integrator.
+        cone: "elliptic", which is exact, or "pyramidal".
     """
     root = Element("mujoco")
     option = SubElement(root, "option", integrator=integrator, cone=cone)
@@ -71,22 +76,22 @@ def model_of(
             b: Body | Drive | Static | Ground = solids[j]
             friction = math.sqrt(a.material.friction * b.material.friction)
             pair = SubElement(contact, "pair", geom1=f"solid{i}", geom2=f"solid{j}")
-            # sliding twice, then twisting and rolling, which three-dimensional contacts don't use
+            # sliding twice, then torsion and rolling, which contacts with condim=3 ignore
             pair.set("friction", _text(friction, friction, 0.005, 0.0001, 0.0001))
             pair.set("condim", "3" if friction > 0.0 else "1")
     return mujoco.MjModel.from_xml_string(tostring(root, encoding="unicode"))
 
 
 class MujocoWorld:
-    """One world of a scene without drives in MuJoCo, read and written as a physics.World is."""
+    """One world of a scene without drives in MuJoCo, with the interface of a physics.World."""
 
     def __init__(
         self, scene: Scene, timestep: float, integrator: str = "Euler", cone: str = "elliptic"
     ) -> None:
-        """Puts the scene's bodies into their state; elliptic friction cones are the exact ones."""
+        """Sets the bodies to the initial state of the scene."""
         self._model = model_of(scene, timestep, integrator, cone)
         self._data = mujoco.MjData(self._model)
-        # a free joint's seven coordinates and six speeds, those of rotation in the body's frame
+        # a free joint has seven coordinates and six speeds; the angular ones in the body's frame
         self._place = self._data.qpos.reshape(1, -1, 7)
         self._motion = self._data.qvel.reshape(1, -1, 6)
         masses = [float(b.mass or 0.0) for b in scene.bodies]
@@ -99,12 +104,11 @@ class MujocoWorld:
         self._motion[..., 3:] = rotate_back(self.orientation, spin)
 
     def advance(self, time: float) -> None:
-        """Advances by `time` s, to the nearest whole step."""
-        for _ in range(round(time / self._model.opt.timestep)):
-            mujoco.mj_step(self._model, self._data)
+        """Advances by `time` s, rounded to whole steps."""
+        mujoco.mj_step(self._model, self._data, nstep=round(time / self._model.opt.timestep))
 
     def set_state(self, *, linear_velocity: Any) -> None:
-        """Writes velocities [1, bodies, 3] in m/s, or what broadcasts to it."""
+        """Writes velocities in m/s, of a shape that broadcasts to [1, bodies, 3]."""
         self._motion[..., :3] = linear_velocity
 
     @property

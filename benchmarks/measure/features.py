@@ -1,14 +1,15 @@
-"""What each feature costs: ns a substep of a world, one thread, 1,024 worlds, balanced.
+"""What each feature costs: ns per substep and world, one thread, 1,024 worlds, balanced.
 
-Each row names the row that it adds to and the difference. A slab has unequal moments of
-inertia. Scenes are as they stand after 1/4 s; a resting cube touches with all samples of a face,
-which is its dearest state. Best of the rounds, which take turns over all scenes, as other work on
-the machine can only add time.
+Each row names the row that it extends, and the difference. A slab has unequal moments of inertia.
+Scenes are timed from 1/4 s on: a resting cube then touches with all samples of a face, which is its
+most expensive state. Scenes take turns; figures are the fastest round, as other load on the machine
+can only add time.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-from benchmarks.report import Cell, Table, main, take_turns
+from benchmarks.report.tables import Cell, Table
+from benchmarks.report.timing import Side, take_turns
 from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
 from physics.scene.scene import Static, Vector
 
@@ -18,13 +19,13 @@ ROUNDS, SECONDS = 5, 0.3
 
 SMOOTH, ROUGH = Material(friction=0.0), Material(friction=0.5)
 CUBE, SLAB = Box((0.02, 0.02, 0.02)), Box((0.02, 0.02, 0.015))
-AHEAD = 0.02 + 0.015  # m, where a finger of 15 mm radius touches the cube's side
+TOUCHING = 0.02 + 0.015  # m, distance at which a finger of 15 mm radius touches the cube's face
 
 
 def _cube(
     material: Material = ROUGH, shape: Box = CUBE, finger: Vector | None = None, cubes: int = 1
 ) -> Scene:
-    """Blocks on the ground, stacked, and a finger that stays at a place."""
+    """A tower of blocks on the ground, and a finger that stays at a position."""
     half = shape.half_extents[2]
     bodies = [
         Body(shape, mass=0.1, position=(0, 0, (2 * i + 1) * half), material=material)
@@ -35,7 +36,7 @@ def _cube(
 
 
 def _flying(shape: Box | Sphere, spin: float) -> Scene:
-    """A body alone that spins."""
+    """One body that spins, without gravity."""
     return Scene([Body(shape, mass=0.1, angular_velocity=(spin, 2 * spin, 0))], gravity=(0, 0, 0))
 
 
@@ -55,7 +56,7 @@ def _wall() -> Scene:
     return Scene(scene.bodies, [*scene.statics, wall])
 
 
-# name: what it adds to, scene, fidelity
+# name: the scene that it extends, scene, fidelity
 CASES: dict[str, tuple[str, Scene, Fidelity]] = {
     "ball flies": ("", _flying(Sphere(0.02), 0.0), Fidelity()),
     "cube flies and spins": ("ball flies", _flying(CUBE, 1.0), Fidelity()),
@@ -70,10 +71,10 @@ CASES: dict[str, tuple[str, Scene, Fidelity]] = {
     "cube rests": ("cube rests, no friction", _cube(), Fidelity()),
     "slab rests": ("cube rests", _cube(shape=SLAB), Fidelity()),
     "cube rests, linear dashpot": ("cube rests", _cube(), Fidelity(damping="dashpot")),
-    "cube and finger far off": ("cube rests", _cube(finger=(0.2, 0, 0.1)), Fidelity()),
-    "cube and finger that touches": (
-        "cube and finger far off",
-        _cube(finger=(-AHEAD + 1e-4, 0, 0.02)),
+    "cube and distant finger": ("cube rests", _cube(finger=(0.2, 0, 0.1)), Fidelity()),
+    "cube and touching finger": (
+        "cube and distant finger",
+        _cube(finger=(-TOUCHING + 1e-4, 0, 0.02)),
         Fidelity(),
     ),
     "cube 1 mm from a wall": ("cube rests", _wall(), Fidelity()),
@@ -87,8 +88,8 @@ CASES: dict[str, tuple[str, Scene, Fidelity]] = {
 }
 
 
-def _advance(world: World) -> Callable[[], int]:
-    """A frame a call; counts substeps of all worlds."""
+def _advance(world: World) -> Side:
+    """Each call advances all worlds by a frame; counts the substeps of all worlds."""
     substeps = WORLDS * round(FRAME / world.fidelity.substep)
 
     def frame() -> int:
@@ -99,7 +100,7 @@ def _advance(world: World) -> Callable[[], int]:
 
 
 def measure() -> Iterator[Table]:
-    """All tables of this module."""
+    """One table."""
     sides, touching = {}, {}
     for name, (_, scene, fidelity) in CASES.items():
         world = World(scene, fidelity, count=WORLDS, threads=1)
@@ -110,9 +111,5 @@ def measure() -> Iterator[Table]:
     for name, (base, _, _) in CASES.items():
         added = cost[name] - cost[base] if base else None
         rows.append([name, touching[name], cost[name], added, base or None])
-    columns = ["scene", "contacts", "ns a substep", "more", "than"]
+    columns = ["scene", "contacts", "ns per substep", "difference", "from"]
     yield Table("features", f"One thread, {WORLDS:,} worlds, balanced", columns, rows)
-
-
-if __name__ == "__main__":
-    main(__doc__, measure)

@@ -1,14 +1,16 @@
-"""Memory a world beyond the shared model, in KB of 1,024 bytes.
+"""Memory per world, without the model that all worlds share, in KB of 1,024 bytes.
 
-State: what World.nbytes says. Resident: growth of a process's memory from 1,024 to 16,384 worlds
-of RigidEnvs/Push-v0, divided by the difference, after an episode; now, and at the peak. Each count
-has a process of its own. Reads /proc, hence Linux only.
+State is World.nbytes. Resident is the growth of a process's memory from 1,024 to 16,384 worlds of
+RigidEnvs/Push-v0 after one episode, divided by the number of added worlds; at that time, and at
+the peak. Each number of worlds runs in its own process. Linux only: it reads /proc.
 """
 
 import json
 from collections.abc import Iterator
 
-from benchmarks.report import THREADS, Cell, Table, fresh, main
+from benchmarks.report.processes import run_code
+from benchmarks.report.provenance import THREADS
+from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, World
 from rigid_envs.tasks import Push
 
@@ -27,27 +29,23 @@ for _ in range(51):
     envs.step(np.ones((count, 3), dtype=np.float32))
 with open("/proc/self/status") as file:
     lines = [line.split() for line in file]
-print(json.dumps({words[0]: int(words[1]) for words in lines if words[0] in ("VmRSS:", "VmHWM:")}))
+print(json.dumps({line[0]: int(line[1]) for line in lines if line[0] in ("VmRSS:", "VmHWM:")}))
 """
 
 
 def _resident(count: int, fidelity: str) -> dict[str, float]:
-    """Resident memory of a process with so many worlds, now and at its peak, in KB."""
-    found: dict[str, float] = json.loads(fresh(EPISODE, str(count), str(THREADS), fidelity)[1])
+    """Resident memory of a process with `count` worlds, now and at its peak, in KB."""
+    found: dict[str, float] = json.loads(run_code(EPISODE, str(count), str(THREADS), fidelity)[1])
     return found
 
 
 def measure() -> Iterator[Table]:
-    """All tables of this module."""
+    """One table."""
     rows: list[list[Cell]] = []
     for preset in PRESETS:
         state = World(Push().scene(), preset, count=FEW).nbytes / KB
         few, many = _resident(FEW, preset), _resident(MANY, preset)
         growth = [(many[key] - few[key]) / (MANY - FEW) for key in ("VmRSS:", "VmHWM:")]
         rows.append([preset, "4", state, *growth])
-    columns = ["KB a world", "bar", "state", "resident", "resident at the peak"]
+    columns = ["KB per world", "target", "state", "resident", "resident at the peak"]
     yield Table("memory", f"Push, {FEW:,} to {MANY:,} worlds", columns, rows)
-
-
-if __name__ == "__main__":
-    main(__doc__, measure)

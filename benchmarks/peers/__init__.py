@@ -1,0 +1,1 @@
+"""The other sides of a comparison: MuJoCo, panda-gym, and this project at other commits."""

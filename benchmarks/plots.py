@@ -1,0 +1,63 @@
+"""Draws the pictures of README.md and docs: python -m benchmarks.plots [name ...].
+
+Plots show the tables of benchmarks/results.json; tasks.png shows policies of results/.
+"""
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.draw import env_steps, tasks, work_precision
+from benchmarks.report.provenance import ROOT
+from benchmarks.report.results_file import load
+from benchmarks.report.tables import Table
+
+
+class Plot(NamedTuple):
+    """A plot of a saved table.
+
+    Attributes:
+        table: name of the table.
+        draw: writes the plot to a path.
+        path: the PNG.
+    """
+
+    table: str
+    draw: Callable[[Table, Path], None]
+    path: Path
+
+
+PLOTS = {
+    "env_steps": Plot("worlds", env_steps.draw, ROOT / "docs/images/env_steps.png"),
+    "work_precision": Plot(
+        "work precision", work_precision.draw, ROOT / "docs/images/work_precision.png"
+    ),
+}
+TASKS = ROOT / "docs/tasks.png"
+
+
+def run() -> None:
+    """Draws all pictures, or those named."""
+    names = [*PLOTS, "tasks"]
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
+    options = parser.parse_args()
+    if unknown := [name for name in options.names if name not in names]:
+        parser.error(f"unknown picture: {', '.join(unknown)}; known: {', '.join(names)}")
+    saved = load()
+    for name in options.names or names:
+        if name == "tasks":
+            os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+            tasks.draw(path := TASKS)
+        else:
+            table, draw, path = PLOTS[name]
+            if table not in saved.tables:
+                parser.exit(2, f"{table!r} is not saved: run python -m benchmarks --save first\n")
+            draw(saved.tables[table], path)
+        print(f"written: {path.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,1 @@
+"""Tables, the saved results, timing of sides that take turns, and child processes."""
