@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from benchmarks.report.tables import Cell, Table
 from benchmarks.report.timing import Side, take_turns
 from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
-from physics.scene.scene import Static, Vector
+from physics.scene.solids import Static
+from physics.scene.validation import Vector
 
 WORLDS = 1024
 FRAME = 0.04  # s
@@ -105,7 +106,7 @@ def measure() -> Iterator[Table]:
     for name, (_, scene, fidelity) in CASES.items():
         world = World(scene, fidelity, count=WORLDS, threads=1)
         world.advance(0.25)
-        sides[name], touching[name] = _advance(world), len(world.contacts().overlap)
+        sides[name], touching[name] = _advance(world), len(world.contacts().penetration)
     cost = {name: 1e9 / max(found) for name, found in take_turns(sides, ROUNDS, SECONDS).items()}
     rows: list[list[Cell]] = []
     for name, (base, _, _) in CASES.items():

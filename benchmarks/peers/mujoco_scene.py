@@ -57,7 +57,7 @@ def model_of(
     option = SubElement(root, "option", integrator=integrator, cone=cone)
     option.attrib.update(timestep=_text(timestep), gravity=_text(*scene.gravity))
     world, contact = SubElement(root, "worldbody"), SubElement(root, "contact")
-    solids = [*scene.bodies, *scene.tools, *scene.statics]
+    solids = [*scene.bodies, *scene.driven_bodies, *scene.statics]
     for i, solid in enumerate(solids):
         name = f"solid{i}"
         if isinstance(solid, Ground):

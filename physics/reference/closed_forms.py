@@ -74,6 +74,6 @@ def oblique_impact(
     return along - kick, restitution * down, 2.5 * kick / radius
 
 
-def resting_overlap(force: float, stiffness: float) -> float:
+def resting_penetration(force: float, stiffness: float) -> float:
     """Overlap in m of a face that carries `force` N."""
     return force / stiffness

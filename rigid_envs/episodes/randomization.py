@@ -168,7 +168,7 @@ class Randomization:
         draws = uniform(seeds, episodes, ranges.shape[1], _PARAMETER_STREAM)
         drawn = ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * draws
         self._drawn[mask] = np.minimum(drawn, ranges[..., 1])  # round-off might exceed it
-        if world.features.varied:
+        if world.features.per_world_parameters:
             world.set_parameters(**self._split(self._drawn[mask]), worlds=mask)
 
     @property

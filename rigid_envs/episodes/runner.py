@@ -83,7 +83,7 @@ class Runner:
         self.randomization = Randomization(scene, count, randomize, self.task.size_range)
         ranges = self.randomization.check(randomize)
         per_world = self.randomization.needs_per_world_parameters(ranges)
-        self.world = World(scene, fidelity, count, threads, varied=per_world)
+        self.world = World(scene, fidelity, count, threads, per_world_parameters=per_world)
         if per_world:
             self.randomization.check_step(self.world, ranges)
         self.count = count
@@ -176,8 +176,10 @@ class Runner:
         Running episodes continue bitwise identically.
         """
         old = self.world
-        if not old.features.varied:
-            self.world = World(old.scene, old.fidelity, self.count, old.threads, varied=True)
+        if not old.features.per_world_parameters:
+            self.world = World(
+                old.scene, old.fidelity, self.count, old.threads, per_world_parameters=True
+            )
             parameters = Parameters.of(old.scene, self.count)
             self.world.restore(old.snapshot()._replace(parameters=parameters))
 
@@ -366,7 +368,7 @@ class Runner:
         saved = state["world"]
         if isinstance(saved, Snapshot) and saved.parameters is not None:
             self._use_per_world_parameters()
-        elif isinstance(saved, Snapshot) and self.world.features.varied:
+        elif isinstance(saved, Snapshot) and self.world.features.per_world_parameters:
             saved = saved._replace(parameters=Parameters.of(saved.scene, len(saved.state.world)))
         self.world.restore(saved)
         self.randomization.set_state(state)

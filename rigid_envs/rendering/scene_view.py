@@ -29,7 +29,7 @@ def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item
     """Bodies, drives and statics of one world, as particles if asked for; and grippers' arms."""
     engine, scene = runner.world, runner.world.scene
     sizes = np.ones(len(scene.bodies))
-    if engine.features.varied:
+    if engine.features.per_world_parameters:
         sizes = engine.parameters.size[world]
     found: list[Item] = []
     for i, body in enumerate(scene.bodies):
@@ -38,13 +38,13 @@ def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item
         balls = _particles(runner, i, body.shape) if particles else None
         found += _solid(shape, *pose, BODY_COLORS[i % len(BODY_COLORS)], balls)
     tools, first = engine.drive_position[world], len(scene.bodies)
-    for i, drive in enumerate(scene.tools):
+    for i, drive in enumerate(scene.driven_bodies):
         balls = _particles(runner, first + i, drive.shape) if particles else None
         found += _solid(drive.shape, tools[i], np.array(drive.orientation), DRIVE_COLOR, balls)
     for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
             pose = np.array(static.position), np.array(static.orientation)
-            solid = first + len(scene.tools) + i
+            solid = first + len(scene.driven_bodies) + i
             balls = _particles(runner, solid, static.shape) if particles else None
             found += _solid(static.shape, *pose, STATIC_COLOR, balls)
     for i, gripper in scene.grippers:

@@ -109,7 +109,7 @@ class Hand:
             frame: duration of a step in s.
         """
         # the sizes are those of the scene; the same features mean no further kernels to compile
-        world = World(scene, like.fidelity, varied=like.features.varied)
+        world = World(scene, like.fidelity, per_world_parameters=like.features.per_world_parameters)
         closed = np.array(self.home) + np.zeros((2, 3))
         world.move_drives(closed, frame)
         for _ in range(10):

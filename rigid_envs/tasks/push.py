@@ -127,7 +127,7 @@ class Push(Task):
         n = len(draws)
         drawn, more = draws[:, : Push.draw_count], draws[:, Push.draw_count :]
         height = np.full(n, self.block.height)
-        if world.features.varied:
+        if world.features.per_world_parameters:
             height *= world.parameters.size[mask, 0]
         position = np.zeros((n, 1, 3))
         position[:, 0, 2] = height

@@ -134,7 +134,11 @@ class Stack(Task):
         order = np.argsort(draws[:, :cells], axis=1)[:, : n + 1]
         offset = draws[:, cells : cells + 2 * (n + 1)].reshape(count, n + 1, 2)
         places = CELL_CENTERS[order] + JITTER * (2.0 * offset - 1.0)
-        size = world.parameters.size[mask] if world.features.varied else np.ones((count, n))
+        size = (
+            world.parameters.size[mask]
+            if world.features.per_world_parameters
+            else np.ones((count, n))
+        )
         cubes = np.empty((count, n, 3))
         cubes[:, :, :2] = places[:, :n]
         cubes[:, :, 2] = HALF * size
@@ -286,7 +290,11 @@ class Stack(Task):
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
         """The outline of each cube at its goal, in the colour of the cube."""
         places = goal[:-1].reshape(-1, 3)
-        size = world.parameters.size[index] if world.features.varied else np.ones(self.blocks)
+        size = (
+            world.parameters.size[index]
+            if world.features.per_world_parameters
+            else np.ones(self.blocks)
+        )
         halves = np.full((self.blocks, 3), HALF) * size[:, None]
         return [Ghost(h, p, c) for h, p, c in zip(halves, places, BODY_COLORS, strict=False)]
 
@@ -307,7 +315,7 @@ class Stack(Task):
     def _finger_forces(self, world: World) -> Array:
         """Normal forces [blocks, 2, count] in N between each cube and each finger."""
         n = self.blocks
-        forces = [[world.pressing(i, n + finger) for finger in (0, 1)] for i in range(n)]
+        forces = [[world.normal_force(i, n + finger) for finger in (0, 1)] for i in range(n)]
         return np.array(forces)
 
 

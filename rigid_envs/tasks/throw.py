@@ -65,7 +65,11 @@ class Throw(Task):
         if world.fidelity not in self._grasps:
             self._grasps[world.fidelity] = self.hand.settled_grasp(self.scene(), world, self.frame)
         pads, ball = self._grasps[world.fidelity]
-        size = world.parameters.size[mask, BALL] if world.features.varied else np.ones(len(draws))
+        size = (
+            world.parameters.size[mask, BALL]
+            if world.features.per_world_parameters
+            else np.ones(len(draws))
+        )
         pads = np.repeat(pads, len(draws), axis=0)
         pads[:, :, 1] += RADIUS * (size - 1.0)[:, None] * (-1.0, 1.0)
         world.reset(mask)

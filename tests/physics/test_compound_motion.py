@@ -147,7 +147,7 @@ def test_contacts_tell_where_parts_touch_and_how_hard(fidelity):
     np.testing.assert_allclose(
         told.force[~on_ball].sum(axis=0), (0, 0, (MASS + BALL) * 9.81), atol=1e-3
     )
-    assert world.pressing(0, 1)[0] == pytest.approx(BALL * 9.81, rel=2e-3)
+    assert world.normal_force(0, 1)[0] == pytest.approx(BALL * 9.81, rel=2e-3)
     assert world.penetration()[0] < 6e-4
     # impulses are stable at any step
     longest = 0.1 if fidelity == "balanced" else math.inf
@@ -287,11 +287,11 @@ def test_snapshots_go_on_to_the_bit():
 def test_sizes_of_their_own_are_those_of_the_scaled_shape():
     body = {"position": (0, 0, 0.06), "angular_velocity": (3.0, 1.0, 2.0)}
     ball = {"position": (0.0, -0.02, 0.13)}
-    world = World(scene(T, body, ball), "balanced", count=3, varied=True)
+    world = World(scene(T, body, ball), "balanced", count=3, per_world_parameters=True)
     world.set_parameters(size=[[1.0, 1.0], [1.2, 1.0], [1.5, 1.0]])
     world.advance(0.3)
     assert np.isfinite(world.first_touch(0, 1)).all()
     for k, size in enumerate((1.0, 1.2, 1.5)):
-        alone = World(scene(T.scaled(size), body, ball), "balanced", varied=True)
+        alone = World(scene(T.scaled(size), body, ball), "balanced", per_world_parameters=True)
         alone.advance(0.3)
         np.testing.assert_allclose(world.position[k], alone.position[0], atol=1e-6)

@@ -68,7 +68,7 @@ def drawn(scene, count=COUNT, seed=0):
 
 def varied(scene, fidelity="balanced", count=COUNT, threads=1, **values):
     """Worlds that start from the scene's state with parameters of their own."""
-    world = World(scene, fidelity, count, threads, varied=True)
+    world = World(scene, fidelity, count, threads, per_world_parameters=True)
     world.set_parameters(**(values or drawn(scene, count)))
     world.reset()
     if scene.drives:
@@ -79,7 +79,7 @@ def varied(scene, fidelity="balanced", count=COUNT, threads=1, **values):
 def everything_of(world, i):
     """All arrays of one world's state, field by field."""
     state, (group, lane) = world._simulation.state, divmod(i, LANES)
-    for table in (state.mover[i], state.side[i], state.world[i]):
+    for table in (state.dynamic[i], state.half_pair[i], state.world[i]):
         yield from (table[name] for name in table.dtype.names)
     yield state.touch[..., i]
     yield state.sample_id[group, :, lane]
@@ -191,13 +191,13 @@ def test_the_distance_of_a_stop_follows_each_worlds_friction():
 
 def test_parameters_are_the_scenes_until_they_are_set():
     scene = everything()
-    for world in (World(scene, count=3), World(scene, count=3, varied=True)):
+    for world in (World(scene, count=3), World(scene, count=3, per_world_parameters=True)):
         for mine, own in zip(world.parameters, Parameters.of(scene, 3), strict=True):
             np.testing.assert_array_equal(mine, own)
 
 
 def test_only_what_is_given_changes_and_only_in_the_chosen_worlds():
-    world = World(everything(), count=4, varied=True)
+    world = World(everything(), count=4, per_world_parameters=True)
     mask = np.array([True, False, False, True])
     world.set_parameters(mass=(1.0, 2.0, 3.0), worlds=mask)
     before = Parameters.of(world.scene, 4)
@@ -209,7 +209,7 @@ def test_only_what_is_given_changes_and_only_in_the_chosen_worlds():
 
 
 def test_velocities_stay_and_momenta_follow():
-    world = World(everything(), count=3, varied=True)
+    world = World(everything(), count=3, per_world_parameters=True)
     linear, angular = world.linear_velocity.copy(), world.angular_velocity.copy()
     momentum = world.linear_momentum()
     world.set_parameters(mass=2.0 * world.parameters.mass, size=1.5)
@@ -239,7 +239,7 @@ def test_what_is_carried_over_continues_to_the_last_bit(way):
     world = varied(scenes.push_like())
     world.advance(0.2)
     if way == "snapshot":
-        other = World(world.scene, count=COUNT, varied=True)
+        other = World(world.scene, count=COUNT, per_world_parameters=True)
         other.restore(pickle.loads(pickle.dumps(world.snapshot())))
     else:
         other = pickle.loads(pickle.dumps(world)) if way == "pickle" else copy.deepcopy(world)
@@ -254,23 +254,25 @@ def test_worlds_that_are_alike_share_one_model():
     scene = scenes.push_like()
     alike = [World(scene, count=n)._simulation.model.nbytes for n in (1, 800)]
     assert alike[0] == alike[1]
-    assert not World(scene).features.varied
-    assert World(scene, varied=True).features.varied
-    assert World(scene, count=800, varied=True).nbytes > World(scene, count=800).nbytes
+    assert not World(scene).features.per_world_parameters
+    assert World(scene, per_world_parameters=True).features.per_world_parameters
+    assert (
+        World(scene, count=800, per_world_parameters=True).nbytes > World(scene, count=800).nbytes
+    )
 
 
 # --- what is refused ----------------------------------------------------------------------------
 
 
 def test_worlds_that_are_alike_take_no_parameters():
-    with pytest.raises(ValueError, match="build the World with varied=True"):
+    with pytest.raises(ValueError, match="build the World with per_world_parameters=True"):
         World(scenes.push_like()).set_parameters(mass=1.0)
-    with pytest.raises(TypeError, match="varied must be bool, got 1"):
-        World(scenes.push_like(), varied=1)
-    alike, other = World(scenes.push_like()), World(scenes.push_like(), varied=True)
-    with pytest.raises(ValueError, match="another varied: False"):
+    with pytest.raises(TypeError, match="per_world_parameters must be bool, got 1"):
+        World(scenes.push_like(), per_world_parameters=1)
+    alike, other = World(scenes.push_like()), World(scenes.push_like(), per_world_parameters=True)
+    with pytest.raises(ValueError, match="another per_world_parameters: False"):
         other.restore(alike.snapshot())
-    with pytest.raises(ValueError, match="another varied: True"):
+    with pytest.raises(ValueError, match="another per_world_parameters: True"):
         alike.restore(other.snapshot())
 
 
@@ -288,7 +290,7 @@ def test_worlds_that_are_alike_take_no_parameters():
     ],
 )
 def test_bad_values_are_named_and_nothing_is_written(values, message):
-    world = World(scenes.push_like(), count=3, varied=True)
+    world = World(scenes.push_like(), count=3, per_world_parameters=True)
     before, hashes = world.parameters, digests(world)
     with pytest.raises(ValueError, match=re.escape(message)):
         world.set_parameters(**values, worlds=np.array([False, True, True]))
@@ -311,12 +313,12 @@ def test_bad_values_are_named_and_nothing_is_written(values, message):
 )
 def test_bad_ranges_are_named(ranges, error, message):
     with pytest.raises(error, match=re.escape(message)):
-        World(scenes.push_like(), varied=True).check_parameters(ranges)
+        World(scenes.push_like(), per_world_parameters=True).check_parameters(ranges)
 
 
 def test_a_range_is_held_against_the_stable_step_before_anything_runs():
     scene = scenes.block_on_ground(stiffness=1000.0)
-    world = World(scene, count=2, varied=True)
+    world = World(scene, count=2, per_world_parameters=True)
     world.check_parameters({"mass": (0.1, 5.0)})
     message = r"mass 0\.001 kg.*Material\.stiffness 1000 .*body 0 binds.*largest safe step is"
     with pytest.raises(ValueError, match=message):
@@ -324,18 +326,18 @@ def test_a_range_is_held_against_the_stable_step_before_anything_runs():
     with pytest.raises(ValueError, match=r"world 1.*mass 0\.001.*largest safe step"):
         world.set_parameters(mass=[[0.1], [0.001]])
     np.testing.assert_array_equal(world.parameters.mass, [[0.1], [0.1]])
-    World(scene, varied=True, allow_unstable=True).set_parameters(mass=0.001)
+    World(scene, per_world_parameters=True, allow_unstable=True).set_parameters(mass=0.001)
 
 
 def test_without_a_stiffness_any_mass_is_stable_and_the_smallest_size_may_sink():
-    world = World(scenes.block_on_ground(), varied=True)
+    world = World(scenes.block_on_ground(), per_world_parameters=True)
     world.check_parameters({"mass": (1e-6, 1e6)})
     with pytest.raises(ValueError, match=r"size 0\.001.*too long for body 0.*would sink"):
         world.check_parameters({"size": (0.001, 1.0)})
 
 
 def test_a_body_does_not_shrink_until_it_falls_between_samples():
-    world = World(scenes.two_cubes(), count=2, varied=True)
+    world = World(scenes.two_cubes(), count=2, per_world_parameters=True)
     world.set_parameters(size=[[0.6, 0.6], [1.0, 0.8]])
     with pytest.raises(ValueError, match=r"size 0\.4 makes body 1.* fall between"):
         world.check_parameters({"size": ([1.0, 0.4], [1.0, 1.0])})

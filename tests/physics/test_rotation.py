@@ -46,8 +46,8 @@ def test_the_printed_matrix_of_the_lesson_takes_a_body_frame_spin():
 
 @pytest.mark.parametrize(
     ("turn", "angle"),
-    [(rotation.turn, angle) for angle in (0.0, 1e-12, 1e-3, 0.2999999)]
-    + [(rotation.turn_far, angle) for angle in (1e-12, 0.3000001, 1.0, 3.1, 20.0)],
+    [(rotation.rotate_quaternion, angle) for angle in (0.0, 1e-12, 1e-3, 0.2999999)]
+    + [(rotation.rotate_quaternion_far, angle) for angle in (1e-12, 0.3000001, 1.0, 3.1, 20.0)],
 )
 def test_a_turn_is_the_exponential_map_in_the_world_frame(turn, angle):
     axes = SPINS / np.linalg.norm(SPINS, axis=-1, keepdims=True)

@@ -47,7 +47,7 @@ def digests(world):
 
     def parts(w):
         group, lane = divmod(w, LANES)
-        yield from (state.mover[w], state.side[w], state.touch[..., w], state.world[w])
+        yield from (state.dynamic[w], state.half_pair[w], state.touch[..., w], state.world[w])
         yield state.sample_id[group, :, lane]
         for name in state.candidate.dtype.names:
             yield state.candidate[name][group, ..., lane]
@@ -130,7 +130,7 @@ def test_without_a_stiffness_no_step_is_too_long():
 def test_a_servo_that_the_step_cannot_carry_is_refused():
     scene = Scene([], drives=[Drive(BALL, 0.1, 5.0, frequency=900.0)])
     with pytest.raises(
-        ValueError, match=r"Drive\.frequency 900 .* tool 0 .*safe step is (\S+) s"
+        ValueError, match=r"Drive\.frequency 900 .* drive 0 .*safe step is (\S+) s"
     ) as e:
         World(scene)
     safe = float(str(e.value).split("largest safe step is ")[1].split()[0].rstrip(";"))
@@ -308,7 +308,7 @@ def test_setting_a_state_forgets_what_is_hidden():
         world.set_state(**state)
         world.command_drives((0.1, 0.0, 0.0))
         world.advance(0.1)
-    np.testing.assert_array_equal(used.snapshot().state.mover, fresh.snapshot().state.mover)
+    np.testing.assert_array_equal(used.snapshot().state.dynamic, fresh.snapshot().state.dynamic)
 
 
 @pytest.mark.parametrize(
@@ -363,7 +363,7 @@ def test_reset_brings_the_masked_worlds_back_to_the_start():
     start.advance(0.1)
     for w in range(3):
         np.testing.assert_array_equal(
-            world.snapshot().state.mover[w], start.snapshot().state.mover[0]
+            world.snapshot().state.dynamic[w], start.snapshot().state.dynamic[0]
         )
 
 
@@ -497,7 +497,7 @@ def test_a_feature_that_is_not_needed_changes_no_bit():
     for world in worlds:
         world.advance(1.0)
     for name in ("position", "orientation", "momentum", "angular_momentum", "force", "torque"):
-        first, second = (w.snapshot().state.mover[name][0, 0] for w in worlds)
+        first, second = (w.snapshot().state.dynamic[name][0, 0] for w in worlds)
         np.testing.assert_array_equal(first, second, err_msg=name)
 
 
@@ -508,7 +508,7 @@ def test_a_distant_body_of_another_kind_changes_no_bit():
     worlds = [World(plain), World(dataclasses.replace(plain, bodies=bodies[:1]))]
     for world in worlds:
         world.advance(1.0)
-    first, second = (w.snapshot().state.mover[0, 0] for w in worlds)
+    first, second = (w.snapshot().state.dynamic[0, 0] for w in worlds)
     for name in ("position", "orientation", "momentum", "angular_momentum"):
         np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
@@ -609,7 +609,7 @@ def test_a_diverging_world_is_named_and_the_others_go_on():
     others = [0, 1, 2, 4]
     for w in others:
         np.testing.assert_array_equal(
-            world.snapshot().state.mover[w], twin.snapshot().state.mover[w]
+            world.snapshot().state.dynamic[w], twin.snapshot().state.dynamic[w]
         )
     # it stays reported until it is brought back, and the others stay whole
     with pytest.raises(SimulationDiverged):
@@ -620,7 +620,7 @@ def test_a_diverging_world_is_named_and_the_others_go_on():
     twin.advance(0.02)
     for w in others:
         np.testing.assert_array_equal(
-            world.snapshot().state.mover[w], twin.snapshot().state.mover[w]
+            world.snapshot().state.dynamic[w], twin.snapshot().state.dynamic[w]
         )
     assert np.all(np.isfinite(world.position))
 

@@ -6,8 +6,7 @@ that installs it. Flags have the names of rl-baselines3-zoo where it has the sam
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -28,8 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         extras.require(*options.needs)
-        with _reporting_compilation() if options.simulates else nullcontext():
-            status: int = options.run(options)
+        status: int = options.run(options)
     except UsageError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -37,23 +35,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
         return handlers.INTERRUPTED
     return status
-
-
-@contextmanager
-def _reporting_compilation() -> Iterator[None]:
-    """Reports the start of compilation on stderr, during which the command prints nothing."""
-    from physics.jit import telling  # not imported for --help, which it would slow down
-
-    def report(name: str) -> None:
-        if name == "advance":
-            print(
-                "compiling the kernels (10 to 30 s); later runs load them from a cache",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    with telling(report):
-        yield
 
 
 def _version() -> str:
@@ -76,10 +57,9 @@ def _parser() -> argparse.ArgumentParser:
         run: Any,
         summary: str,
         needs: tuple[str, Sequence[str]] = train_extra,
-        simulates: bool = True,
     ) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=summary, description=summary)
-        added.set_defaults(run=run, needs=needs, simulates=simulates)
+        added.set_defaults(run=run, needs=needs)
         return added
 
     training = command("train", handlers.train, "Train a policy into a new run folder.")
@@ -131,9 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     flags.add_play(playing)
 
-    plotting = command(
-        "plot", handlers.plot, "Plot the learning curve of one or several runs.", simulates=False
-    )
+    plotting = command("plot", handlers.plot, "Plot the learning curve of one or several runs.")
     flags.add_plot(plotting)
 
     recording_results = command(

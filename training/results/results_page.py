@@ -232,7 +232,7 @@ def _summary(results: Sequence[Result]) -> str:
     lines = [" | ".join(columns), " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])]
     environments: dict[str, list[list[Result]]] = {}
     for group in by_kind(results):
-        environments.setdefault(_environment(group[0]), []).append(group)
+        environments.setdefault(_task_key(group[0]), []).append(group)
     for groups in environments.values():
         first = groups[0][0]
         names = dict.fromkeys(_name(group[0]) for group in groups)
@@ -244,7 +244,7 @@ def _summary(results: Sequence[Result]) -> str:
     return "\n".join([*(f"| {line} |" for line in lines), ""])
 
 
-def _environment(one: Result) -> str:
+def _task_key(one: Result) -> str:
     """A key that is the same for the sparse and the dense id of a task."""
     task = gym.spec(one.env_id).kwargs.get("task", one.env_id)
     return f"{task} {_changes(one)}"

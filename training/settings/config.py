@@ -33,7 +33,7 @@ OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
 """Import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3."""
 WRAPPERS = (
     "rigid_envs.wrappers.ActionPenalty",
-    "rigid_envs.wrappers.ClipReward",
+    "rigid_envs.wrappers.BoundReward",
     "rigid_envs.wrappers.ScaleReward",
     "rigid_envs.wrappers.SmoothnessPenalty",
     "rigid_envs.wrappers.SuccessBonus",

@@ -14,7 +14,7 @@ from rigid_envs.episodes.draws import normal, uniform
 from rigid_envs.episodes.runner import Runner
 from rigid_envs.rendering import scene_view
 from rigid_envs.tasks import Push
-from training.scripted import CONTROLLERS
+from training.scripted import controller_for
 
 RANGES = {
     "mass": (0.5, 2.0),
@@ -187,7 +187,7 @@ def test_a_scripted_controller_copes_with_other_sizes(env_id, steps, least):
     env = gym.make_vec(env_id, num_envs=200, randomize={"size": (0.8, 1.2)})
     observation, _ = env.reset(seed=0)
     for _ in range(steps):
-        observation, _, _, truncated, info = env.step(CONTROLLERS[env_id](observation))
+        observation, _, _, truncated, info = env.step(controller_for(env_id)(observation))
     assert truncated.all()
     assert info["is_success"].mean() >= least
 
@@ -222,8 +222,10 @@ def test_observed_parameters_are_those_drawn_and_lie_in_the_space():
 def test_without_randomisation_nothing_is_added_and_no_bit_changes():
     plain, none = (gym.make_vec(PUSH, num_envs=4, **extra) for extra in ({}, {"randomize": {}}))
     assert played(plain, 20).tobytes() == played(none, 20).tobytes()
-    assert not none.unwrapped._runner.world.features.varied
-    assert not vector(2, randomize={"noise": 0.1}).unwrapped._runner.world.features.varied
+    assert not none.unwrapped._runner.world.features.per_world_parameters
+    assert not vector(
+        2, randomize={"noise": 0.1}
+    ).unwrapped._runner.world.features.per_world_parameters
     same = {"mass": (1.0, 1.0), "friction": 0.5, "restitution": 0.1, "size": 1.0}
     assert played(vector(4, randomize=same), 20).tobytes() == played(plain, 20).tobytes()
 

@@ -30,7 +30,7 @@ from tests.rigid_envs.rollout import (
     random_actions,
     steps_of,
 )
-from training.scripted import CONTROLLERS
+from training.scripted import controller_for
 from training.scripted.push import push
 
 CORNERS = HALF * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -148,7 +148,7 @@ def test_a_scripted_controller_solves_it(fidelity):
     envs = make_vec(1000, fidelity=fidelity)
     observation, _ = envs.reset(seed=0)
     for _ in range(EPISODE):
-        observation, _, _, truncated, info = envs.step(CONTROLLERS[PUSH](observation))
+        observation, _, _, truncated, info = envs.step(controller_for(PUSH)(observation))
     assert truncated.all()
     assert info["is_success"].mean() >= 0.99
 

@@ -15,7 +15,7 @@ from rigid_envs.tasks.stack import (
     path_length,
 )
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
-from training.scripted import CONTROLLERS
+from training.scripted import controller_for
 
 EPISODE = 100
 BLOCKS = (2, 3, 5)
@@ -185,7 +185,7 @@ def test_stage_never_falls_by_much_while_a_controller_stacks():
     observation, info = envs.reset(seed=0)
     best, fell, solved = info["stage"], np.zeros(worlds), np.zeros(worlds, dtype=bool)
     for _ in range(EPISODE):
-        observation, _, _, _, info = envs.step(CONTROLLERS[STACK](observation))
+        observation, _, _, _, info = envs.step(controller_for(STACK)(observation))
         best = np.maximum(best, info["stage"])
         fell = np.maximum(fell, best - info["stage"])
         solved |= info["is_success"]
@@ -322,7 +322,7 @@ def solved(fidelity: str, worlds: int, blocks: int) -> np.ndarray:
     envs = make_vec(worlds, STACK, fidelity=fidelity, blocks=blocks)
     observation, _ = envs.reset(seed=0)
     for _ in range(EPISODE):
-        observation, _, _, truncated, info = envs.step(CONTROLLERS[STACK](observation))
+        observation, _, _, truncated, info = envs.step(controller_for(STACK)(observation))
     assert truncated.all()
     goal_distance = distance(observation["achieved_goal"], observation["desired_goal"])
     np.testing.assert_array_equal(info["is_success"], goal_distance <= THRESHOLD)

@@ -13,7 +13,7 @@ from rigid_envs.tasks.throw import (
     Throw,
 )
 from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, random_actions, steps_of
-from training.scripted import CONTROLLERS
+from training.scripted import controller_for
 
 EPISODE = 50
 HOLD, DROP = np.array([0.0, 0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.0, 1.0])
@@ -82,7 +82,7 @@ def test_aim_is_the_error_of_a_ball_released_now():
     free = np.zeros(16, dtype=bool)
     for _ in range(EPISODE):
         before = info["aim"]
-        observation, _, _, _, info = envs.step(CONTROLLERS[THROW](observation))
+        observation, _, _, _, info = envs.step(controller_for(THROW)(observation))
         # flight changes nothing of where it lands
         np.testing.assert_allclose(info["aim"][free], before[free], atol=0.01)
         ball, hand = observation["observation"][:, 11:14], observation["observation"][:, :3]
@@ -124,6 +124,6 @@ def test_a_scripted_controller_hits(fidelity, stress):
     envs = make_vec(worlds, THROW, fidelity=fidelity)
     observation, _ = envs.reset(seed=0)
     for _ in range(EPISODE):
-        observation, _, _, truncated, info = envs.step(CONTROLLERS[THROW](observation))
+        observation, _, _, truncated, info = envs.step(controller_for(THROW)(observation))
     assert truncated.all()
     assert info["is_success"].mean() >= 0.95

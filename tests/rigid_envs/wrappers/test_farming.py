@@ -26,7 +26,7 @@ from rigid_envs.wrappers.vector import (
     TimePenalty,
 )
 from tests.rigid_envs.rollout import PUSH, STACK, THROW, make_vec
-from training.scripted import CONTROLLERS
+from training.scripted import controller_for
 
 Array = np.ndarray
 # from observations and the number of the step to actions
@@ -70,7 +70,7 @@ class Case:
     def solve(self, observation: dict[str, Array], step: int) -> Array:
         """The scripted controller, with the options that it needs."""
         posts = {k: v for k, v in self.options.items() if k == "obstacles"}
-        return CONTROLLERS[self.env_id](observation, **posts)
+        return controller_for(self.env_id)(observation, **posts)
 
 
 def always(*action: float) -> Policy:
@@ -105,12 +105,12 @@ def shake(observation: dict[str, Array], step: int) -> Array:
     side = np.stack([-away[:, 1], away[:, 0], np.zeros(len(away))], axis=1)
     elsewhere = cube + (0.06 if step // 13 % 2 else -0.06) * side
     goals = {"achieved_goal": cube, "desired_goal": elsewhere}
-    return CONTROLLERS[PUSH]({**observation, **goals})
+    return controller_for(PUSH)({**observation, **goals})
 
 
 def stop_short(observation: dict[str, Array], step: int) -> Array:
     """Solves the task almost: stops just outside of the threshold."""
-    actions = CONTROLLERS[PUSH](observation)
+    actions = controller_for(PUSH)(observation)
     missing = distance(observation["desired_goal"], observation["achieved_goal"])
     return np.where(missing[:, None] < 2.2 * push.THRESHOLD, 0.0, actions)
 
@@ -121,7 +121,7 @@ def bring_it_as_it_lies(observation: dict[str, Array], step: int) -> Array:
     goals = {"achieved_goal": achieved[:, :3], "desired_goal": desired[:, :3]}
     near = distance(*goals.values()) < 2.0 * push.THRESHOLD
     turned = distance(achieved[:, 3:], desired[:, 3:]) < 1.2 * push.THRESHOLD
-    actions = CONTROLLERS[PUSH]({**observation, **goals})
+    actions = controller_for(PUSH)({**observation, **goals})
     return np.where((near & turned)[:, None], 0.0, actions)
 
 
@@ -151,7 +151,7 @@ def hover_above_the_first(observation: dict[str, Array], step: int) -> Array:
 
 def grip_and_shake(observation: dict[str, Array], step: int) -> Array:
     """Grips the first cube and moves it to and fro."""
-    actions = CONTROLLERS[STACK](observation)
+    actions = controller_for(STACK)(observation)
     offset = np.abs(observation["achieved_goal"][:, :3] - observation["observation"][:, :3])
     gripped = (offset.max(axis=1) < 0.75 * HALF) & (
         observation["observation"][:, 6] < 2.0 * HALF + 0.003
@@ -170,7 +170,7 @@ def hold_in_place(cube: int) -> Policy:
     """Stacks until a cube is at its goal, and does not release it there."""
 
     def policy(observation: dict[str, Array], step: int) -> Array:
-        actions = CONTROLLERS[STACK](observation)
+        actions = controller_for(STACK)(observation)
         there = _missing(observation, cube) < THRESHOLD
         return np.where(there[:, None], [0.0, 0.0, 0.0, CLOSE], actions)
 
@@ -179,7 +179,7 @@ def hold_in_place(cube: int) -> Policy:
 
 def leave_the_last(observation: dict[str, Array], step: int) -> Array:
     """Stacks all cubes except the last one."""
-    actions = CONTROLLERS[STACK](observation)
+    actions = controller_for(STACK)(observation)
     released = observation["observation"][:, 6] > 2.0 * HALF + 0.014
     done = (_missing(observation, 0) < THRESHOLD) & released
     return np.where(done[:, None], [0.0, 0.0, 0.0, OPEN], actions)
@@ -200,7 +200,7 @@ def reach_out(observation: dict[str, Array], step: int) -> Array:
 
 def swing_and_hold_on(observation: dict[str, Array], step: int) -> Array:
     """Throws without releasing the ball."""
-    actions = CONTROLLERS[THROW](observation)
+    actions = controller_for(THROW)(observation)
     actions[:, 3] = CLOSE
     return actions
 

@@ -76,7 +76,7 @@ def test_her_with_infos_recomputes_costs_of_actions():
         ("SuccessBonus", {"bonus": 1.0}),
         ("TimePenalty", {"penalty": 1.0}),
         ("ScaleReward", {"scale": 0.1}),
-        ("ClipReward", {"low": -0.5, "high": 0.0}),
+        ("BoundReward", {"low": -0.5, "high": 0.0}),
     ],
 )
 @pytest.mark.parametrize("kind", ["sparse", "dense"])

@@ -9,7 +9,7 @@ import pytest
 
 from physics import Body, Box, Capsule, Compound, Fidelity, Ground, Part, Scene, Sphere, World
 from physics.rotation import from_rotation_vector
-from physics.scene.internal_faces import covers
+from physics.scene.internal_faces import hidden_faces
 from physics.scene.shapes import Shape
 
 BAR, STEM = Box((0.04, 0.01, 0.015)), Box((0.01, 0.02, 0.015))
@@ -126,7 +126,7 @@ def test_particles_of_a_compound_are_refused_by_name():
 @pytest.mark.parametrize("shape", [T, HALVES, DUMBBELL])
 @pytest.mark.parametrize("spacing", [0.01, 0.005])
 def test_samples_lie_on_the_core_of_the_whole(shape, spacing):
-    for group, sharp in shape.groups(spacing, 2e-4):
+    for group, sharp in shape.sample_sets(spacing, 2e-4):
         apart = np.min([part.distance(group.positions) for part in shape.parts], axis=0)
         least = 2e-4 if sharp else group.radius
         assert np.all(apart > -1.8 * least)  # a corner's inset is sqrt(3) times the rounding
@@ -163,22 +163,22 @@ def test_no_sample_lies_on_a_seam_but_where_it_ends_in_an_edge():
 
 
 def test_samples_of_one_radius_make_a_group():
-    assert [group.samples.radius for group in DUMBBELL.groups(0.01, 1e-4)] == [0.02, 0.01]
-    assert len(T.groups(0.01, 1e-4)) == 1
-    assert T.groups(0.01, 1e-4)[0].sharp
+    assert [group.samples.radius for group in DUMBBELL.sample_sets(0.01, 1e-4)] == [0.02, 0.01]
+    assert len(T.sample_sets(0.01, 1e-4)) == 1
+    assert T.sample_sets(0.01, 1e-4)[0].face_normals
 
 
 def test_a_ball_that_a_box_swallows_has_no_sample():
     shape = Compound([(Box((0.05, 0.05, 0.05)), (0, 0, 0)), (Sphere(0.01), (0, 0, 0))])
-    (group,) = shape.groups(0.05, 1e-4)
-    assert group.sharp
+    (group,) = shape.sample_sets(0.05, 1e-4)
+    assert group.face_normals
 
 
 # --- seams --------------------------------------------------------------------------------------
 
 
 def test_a_seam_hides_what_the_other_box_stands_on():
-    of_bar, of_stem = covers(T.parts)
+    of_bar, of_stem = hidden_faces(T.parts)
     (bar,), (stem,) = of_bar, of_stem
     # the axes after y are z and x: flush above and below, and as wide as the stem
     # to 20 µm within the stem, the latter of the two
@@ -191,20 +191,20 @@ def test_a_seam_hides_what_the_other_box_stands_on():
 
 def test_a_box_turned_by_a_quarter_hides_as_much():
     turned = Compound([(BAR, (0, 0, 0)), (Box((0.02, 0.01, 0.015)), (0, -0.03, 0), QUARTER)])
-    (bar,), _ = covers(turned.parts)
+    (bar,), _ = hidden_faces(turned.parts)
     np.testing.assert_allclose([bar.low, bar.high], [(-math.inf, -0.01), (math.inf, 0.01)])
 
 
 def test_boxes_that_touch_at_an_edge_or_not_at_all_hide_nothing():
     for place in ((0.05, -0.03, 0.0), (0.0, -0.031, 0.0)):
         first, second = Part(BAR), Part(STEM, place)
-        assert covers([first, second]) == [[], []]
+        assert hidden_faces([first, second]) == [[], []]
     turn = tuple(from_rotation_vector(np.array([0.0, 0.0, 0.3])))
-    assert covers([Part(BAR), Part(STEM, (0.0, -0.03, 0.0), turn)]) == [[], []]
-    assert covers([Part(BAR), Part(Sphere(0.01), (0.0, -0.02, 0.0))]) == [[], []]
+    assert hidden_faces([Part(BAR), Part(STEM, (0.0, -0.03, 0.0), turn)]) == [[], []]
+    assert hidden_faces([Part(BAR), Part(Sphere(0.01), (0.0, -0.02, 0.0))]) == [[], []]
 
 
 def test_every_pair_of_a_row_of_boxes_has_two_covers():
     row = Compound([(Box((0.01, 0.01, 0.01)), (0.02 * k, 0, 0)) for k in range(4)])
-    assert [len(some) for some in covers(row.parts)] == [1, 2, 2, 1]
-    assert all(c.axis == 0 for c in itertools.chain(*covers(row.parts)))
+    assert [len(some) for some in hidden_faces(row.parts)] == [1, 2, 2, 1]
+    assert all(c.axis == 0 for c in itertools.chain(*hidden_faces(row.parts)))

@@ -112,9 +112,9 @@ def test_a_contact_lasts_half_a_period_and_sinks_v_over_omega():
 def test_a_cube_sinks_as_deep_however_many_samples_it_has(spacing, samples):
     fidelity = Fidelity(spacing=spacing)
     world = settled(scenes.block_on_ground(), fidelity)
-    assert world._simulation.model.side["sample_count"].tolist() == [samples]
+    assert world._simulation.model.half_pair["sample_count"].tolist() == [samples]
     stiffness = 0.1 * (fidelity.contact_resolution / fidelity.substep) ** 2
-    sink = closed_forms.resting_overlap(0.1 * GRAVITY, stiffness)
+    sink = closed_forms.resting_penetration(0.1 * GRAVITY, stiffness)
     assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=1e-6)
     assert world.penetration()[0] == pytest.approx(sink, rel=1e-6)
 
@@ -374,7 +374,7 @@ def test_a_ball_that_presses_a_cube_far_from_its_centre_presses_steadily(arm, fi
         height = 0.04 - 1.0 * ((k + 1) * step) ** 2
         world.move_drives((*arm, height), step)
         world.advance(step)
-        pressed.append(world.pressing(0, 1)[0])
+        pressed.append(world.normal_force(0, 1)[0])
     late = np.array(pressed[len(pressed) // 2 :])
     assert np.abs(np.diff(late)).max() < 0.2 * late.mean()
 
@@ -583,7 +583,7 @@ def pressed_cube(force_limit):
 def test_a_drive_pushes_no_matter_through_the_ground(force_limit):
     world = pressed_cube(force_limit)
     omega = world.fidelity.contact_resolution / world.fidelity.substep
-    sink = closed_forms.resting_overlap(force_limit + 0.1 * GRAVITY, 0.1 * omega**2)
+    sink = closed_forms.resting_penetration(force_limit + 0.1 * GRAVITY, 0.1 * omega**2)
     assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=0.3)
     assert world.drive_position[0, 0, 2] > 0.045
 

@@ -141,8 +141,8 @@ def test_a_cube_sinks_as_the_spring_would_however_many_samples_it_has(spacing):
     sink = GRAVITY * (fidelity.substep / fidelity.contact_resolution) ** 2
     assert 0.02 - world.position[0, 0, 2] == pytest.approx(sink, rel=1e-6)
     told = world.contacts()
-    assert len(told.overlap) == 4
-    np.testing.assert_allclose(told.overlap, sink, rtol=1e-4)
+    assert len(told.penetration) == 4
+    np.testing.assert_allclose(told.penetration, sink, rtol=1e-4)
     np.testing.assert_allclose(told.force.sum(axis=0), (0, 0, 0.1 * GRAVITY), atol=1e-7)
 
 

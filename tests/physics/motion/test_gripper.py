@@ -68,7 +68,7 @@ def test_let_go_it_falls(fidelity):
     move(world, np.array([0.0, 0.0, 0.15]), 0.08, 0.2)
     move(world, np.array([0.0, 0.0, 0.15]), 0.08, 1.0)
     assert world.position[0, 0, 2] == pytest.approx(0.02, abs=1e-3)
-    assert not any(world.pressing(0, finger)[0] for finger in (1, 2))
+    assert not any(world.normal_force(0, finger)[0] for finger in (1, 2))
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
@@ -144,20 +144,20 @@ def test_a_full_grip_leaves_the_carriage_its_force():
 def test_a_gripper_counts_as_two_tools_between_others():
     drive = Drive(Sphere(0.01), 0.1, 1.0)
     made = Scene([], drives=[drive, Gripper(CUBE, 0.1, 2.0, 1.0, position=(1, 2, 3)), drive])
-    assert len(made.tools) == 4
+    assert len(made.driven_bodies) == 4
     assert made.grippers[0][0] == 1
-    np.testing.assert_allclose(made.tools[1].position, (1, 1.95, 3))
-    np.testing.assert_allclose(made.tools[2].position, (1, 2.05, 3))
-    assert made.tools[1].force_limit == 1.0
+    np.testing.assert_allclose(made.driven_bodies[1].position, (1, 1.95, 3))
+    np.testing.assert_allclose(made.driven_bodies[2].position, (1, 2.05, 3))
+    assert made.driven_bodies[1].force_limit == 1.0
     with pytest.raises(ValueError, match="fingers of a gripper never do"):
-        World(made).pressing(1, 2)
+        World(made).normal_force(1, 2)
 
 
 def test_fingers_are_not_set_apart_along_x_or_z():
     world = World(scene())
     before = world.drive_position.copy()
     with pytest.raises(
-        ValueError, match=r"drive_position must have the same x and z.*tools 0 and 1"
+        ValueError, match=r"drive_position must have the same x and z.*drives 0 and 1"
     ):
         world.set_state(drive_position=[[[0.0, -0.05, 0.02], [0.01, 0.05, 0.02]]])
     np.testing.assert_array_equal(world.drive_position, before)

@@ -116,7 +116,7 @@ def test_viscous_friction_creeps_where_coulombs_holds():
     """At m g sin = c v: slow, and so is what a user pays with."""
     angle = math.radians(10.0)
     world = settled(scenes.block_on_ground(angle=angle), VISCOUS, time=2.0)
-    damping = float(world._simulation.model.side["shear_damping"][0])
+    damping = float(world._simulation.model.half_pair["shear_damping"][0])
     expected = 0.1 * GRAVITY * math.sin(angle) / damping
     assert world.linear_velocity[0, 0, 0] == pytest.approx(expected, rel=1e-6)
     assert expected < 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from physics import World
 from physics.reference import scenes
-from physics.step.threads import check_threads, default_threads, share_out
+from physics.step.threads import check_threads, default_threads, run_in_blocks
 
 
 @pytest.mark.parametrize("count", [1, 63, 64, 65, 1000, 4096])
@@ -20,7 +20,7 @@ def test_blocks_cover_every_world_once(count, threads):
             seen.extend(range(first, last))
         return last - first
 
-    assert share_out(run, count, threads) == count
+    assert run_in_blocks(run, count, threads) == count
     assert sorted(seen) == list(range(count))
 
 
@@ -31,7 +31,7 @@ def test_an_error_in_any_thread_is_raised():
         return 0
 
     with pytest.raises(ValueError, match="the last block"):
-        share_out(run, 1000, 4)
+        run_in_blocks(run, 1000, 4)
 
 
 def test_all_cores_are_used_unless_told_otherwise():
