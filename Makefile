@@ -2,13 +2,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: help demo test stress bench check docs clean
+.PHONY: help demo test package stress bench check docs clean
 
 help:
 	@echo "make demo    train the pushing policy, evaluate it, film it"
 	@echo "make test    run the tests"
-	@echo "make stress  run the tests with many more random examples"
-	@echo "make bench   measure speed and accuracy, peers beside"
+	@echo "make package test the built wheel and the settings that rl-baselines3-zoo reads"
+	@echo "make stress  run the tests in their long form, with many more random examples"
+	@echo "make bench   measure speed and accuracy, together with MuJoCo"
 	@echo "make check   lint, format, types, import rules, documentation"
 	@echo "make docs    build the documentation into docs/_build/html"
 	@echo "make clean   remove builds and caches (not runs/, not .venv)"
@@ -25,7 +26,10 @@ demo: $(STAMP)
 	$(BIN)/rigid-envs demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not packaging"
+
+package: $(STAMP)
+	$(BIN)/python -m pytest -q -m packaging
 
 stress: $(STAMP)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress
