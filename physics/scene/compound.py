@@ -1,16 +1,22 @@
-"""Compound: one solid made of spheres, boxes and capsules that are joined for good.
+"""Compound: one rigid solid made of spheres, boxes and capsules.
 
-Its frame is centred at its centre of mass and lies along its principal axes, as every shape's. Each
-part has the same density. Where parts overlap, their mass counts twice: let them touch.
+As for every shape, the origin of the frame is the centre of mass, and the axes are the principal
+axes of inertia. All parts have the same density. Where parts overlap, their mass counts twice, so
+place parts such that they touch without overlap.
 
-As the owner of samples it has those of its parts, but what the others cover. A sample of a box that
-lies on or in another part stays where the solid around it fills less than half of all directions,
-as at edges and corners that stick out; of samples that coincide one stays. A ball goes only where
-another part swallows it. Samples weigh what they do in their part times its volume, so that a flat
-compound lies level, and all by one factor such that of the six sides along its axes that it may lie
-on the heaviest weighs 1.
+A compound uses the samples of its parts, without those that other parts cover:
 
-As a surface each part is one by itself.
+- A sample of a sphere or capsule is removed if its whole sphere lies inside another part.
+- A sample of a box that lies on or inside another part is removed if at least 45 % of the
+  directions around it point into solid. (On a flat face 50 % do.) Samples at protruding edges and
+  corners therefore remain.
+- Samples of one radius at the same position become one sample with their mean weight.
+
+The weight of a sample is its weight in the part times the part's fraction of the volume, so a flat
+compound rests level. Then all weights are multiplied by one factor: of the six sides normal to the
+axes, the one with the largest sum of weights gets the sum 1.
+
+Each part is a surface of its own.
 """
 
 import math
@@ -28,19 +34,20 @@ from physics.scene.shapes import Box, Samples, Surface
 
 Array = np.ndarray
 
-# of the compound's width: how near points count as one, and how far around a point is looked
+# fractions of the compound's width: the distance below which two points count as one, and the
+# distance from a point at which `_useful` tests every direction for solid
 _SAME, _AROUND = 1e-6, 1e-3
-# share of all directions that solid fills around a sample that is no use: a flat face fills half
+# fraction of directions into solid from which on a sample is removed; at a flat face it is 0.5
 _FLAT = 0.45
-# product of inertia, as a share of the tensor's trace, up to which axes count as principal
+# largest product of inertia of principal axes, as a fraction of the tensor's trace
 _ASKEW = 1e-9
 
 
 def _directions(count: int) -> Array:
-    """Unit vectors [count, 3] spread evenly over all directions (Fibonacci's spiral)."""
+    """Unit vectors [count, 3] spread evenly over all directions (Fibonacci sphere)."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    turn = np.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
-    return np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1) * np.sqrt(
+    angle = np.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1) * np.sqrt(
         1.0 - z * z
     ).reshape(-1, 1) + z.reshape(-1, 1) * np.array([0.0, 0.0, 1.0])
 
@@ -49,7 +56,12 @@ _DIRECTIONS = _directions(200)
 
 
 class SampleSet(NamedTuple):
-    """Samples of one radius, and whether they are those of a box, see `box_distance`."""
+    """Samples of one radius.
+
+    Attributes:
+        samples: the samples.
+        face_normals: whether they belong to boxes, see `physics.collision.distances.box_distance`.
+    """
 
     samples: Samples
     face_normals: bool
@@ -59,15 +71,15 @@ class SampleSet(NamedTuple):
 class Compound:
     """Spheres, boxes and capsules joined into one solid.
 
-    The parts are moved so that their common centre of mass is the origin: `parts` tells where they
-    lie then.
+    The parts are translated so that their common centre of mass is the origin. The attribute
+    `parts` contains the translated parts.
 
     Args:
-        parts: a `Part` each, or (shape, position) or (shape, position, orientation).
+        parts: each a `Part`, (shape, position) or (shape, position, orientation).
 
     Raises:
-        TypeError, ValueError: no parts, or not such; axes that are not the principal ones of the
-            whole, with the turn that makes them so.
+        TypeError, ValueError: no parts; an invalid part; axes that are not the principal axes of
+            inertia of the compound (the message gives the rotation that aligns them).
     """
 
     parts: Sequence[Part | tuple[Any, ...]]
@@ -95,13 +107,13 @@ class Compound:
             i, j = np.unravel_index(np.abs(askew).argmax(), (3, 3))
             raise ValueError(
                 f"Compound.parts must have their principal axes along x, y and z, got a product of "
-                f"inertia J_{'xyz'[i]}{'xyz'[j]} of {askew[i, j]:.3g} m^2 a kg: turn all parts by "
-                f"the quaternion {_to_axes(tensor)}"
+                f"inertia J_{'xyz'[i]}{'xyz'[j]} of {askew[i, j]:.3g} kg m^2 per kg: rotate all "
+                f"parts by the quaternion {_to_axes(tensor)}"
             )
 
     @cached_property
     def _tensor(self) -> Array:
-        """[3, 3] m^2, inertia for each kg."""
+        """Inertia tensor per kg of mass, [3, 3] in m^2."""
         whole = self.volume
         properties = [
             MassProperties(
@@ -119,17 +131,17 @@ class Compound:
 
     @property
     def only(self) -> Simple | None:
-        """The shape that this is but for its name, if it has one part."""
+        """The shape of the only part, if there is one part and it is not rotated."""
         return self._parts[0].shape if len(self.parts) == 1 and self._parts[0].still else None
 
     @property
     def volume(self) -> float:
-        """Sum of the parts', in m^3."""
+        """Sum of the parts' volumes, in m^3."""
         return sum(part.shape.volume for part in self._parts)
 
     @property
     def width(self) -> float:
-        """Smallest width in m of any part."""
+        """Smallest width of a part, in m."""
         return min(part.shape.width for part in self._parts)
 
     @property
@@ -138,13 +150,13 @@ class Compound:
         return max(part.farthest for part in self._parts)
 
     def inertia(self, mass: float | Array) -> Array:
-        """Principal moments [..., 3] in kg m^2 of the solid with this mass [...] in kg."""
+        """Principal moments [..., 3] in kg m^2 of a compound of mass [...] in kg."""
         if self.only is not None:
             return self.only.inertia(mass)
         return np.multiply.outer(mass, np.diag(self._tensor))
 
     def scaled(self, factor: float) -> "Compound":
-        """The same shape, each length times a factor."""
+        """The compound with each length multiplied by `factor`."""
         return Compound(
             tuple(
                 Part(
@@ -157,7 +169,12 @@ class Compound:
         )
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """All `sample_sets` as one; their radii [n] where they differ."""
+        """All `sample_sets` in one; the radius is an array [n] if there are several sets.
+
+        Args:
+            spacing: m, largest distance between neighbouring samples of a part.
+            rounding: m by which boxes are inset.
+        """
         sets = [one.samples for one in self.sample_sets(spacing, rounding)]
         if len(sets) == 1:
             return sets[0]
@@ -169,10 +186,12 @@ class Compound:
         )
 
     def sample_sets(self, spacing: float, rounding: float) -> tuple[SampleSet, ...]:
-        """Core samples of the parts, but those that others cover, by their radius.
+        """Samples of the parts, without those that other parts cover, grouped by their radius.
+
+        Samples of boxes are in a separate group.
 
         Args:
-            spacing: m that samples are apart at most.
+            spacing: m, largest distance between neighbouring samples of a part.
             rounding: m by which boxes are inset.
         """
         if self.only is not None:
@@ -180,7 +199,7 @@ class Compound:
         same = _SAME * self.width
         groups: dict[tuple[Any, bool], list[Array]] = {}
         for i, part in enumerate(self._parts):
-            # which are of use is seen where the edges are, not where rounding insets them to
+            # `_useful` needs the positions on the real edges, not those on the inset core
             inset, outer = (part.shape.samples(spacing, r) for r in (rounding, 0.0))
             edges = part.outward(outer.positions)
             weights = part.shape.volume / self.volume * inset.weights
@@ -201,7 +220,15 @@ class Compound:
         )
 
     def _useful(self, i: int, points: Array, radius: float | Array) -> Array:
-        """Which samples [n] of part i, at points [n, 3] m, are no part of another."""
+        """Mask [n] of the samples of part i that other parts do not cover.
+
+        The docstring of this module gives the rules.
+
+        Args:
+            i: index of the part.
+            points: [n, 3] m, positions of its samples in the compound's frame.
+            radius: m, of its samples; 0 for a box.
+        """
         others = [part for j, part in enumerate(self._parts) if j != i]
         if not others:
             return np.ones(len(points), dtype=bool)
@@ -213,28 +240,30 @@ class Compound:
         return (deepest > _SAME * self.width) | (filled.mean(axis=1) < _FLAT)
 
     def particles(self, spacing: float) -> Samples:
-        """Not known of compounds.
+        """Raises an error: compounds have no particles.
 
         Raises:
             ValueError: always.
         """
-        raise ValueError(
-            "Fidelity.geometry 'particle' has no particles for a Compound: choose 'shape'"
-        )
+        raise ValueError("Fidelity.geometry 'particle' does not support a Compound: choose 'shape'")
 
     def surface(self, rounding: float) -> Surface:
-        """That of its only part; each of several has its own.
+        """The surface of the only part.
 
         Raises:
-            ValueError: it has more than one part.
+            ValueError: the compound has several parts, and so several surfaces, or a rotated part.
         """
         if self.only is None:
-            raise ValueError("a Compound has a surface for each of its parts, and none of its own")
+            raise ValueError("a Compound has a surface for each of its parts, not a common surface")
         return self.only.surface(rounding)
 
 
 def _part(i: int, item: Any) -> Part:
-    """Part i as given."""
+    """The user's item `i` as a Part.
+
+    Raises:
+        TypeError, ValueError: it is not a valid part; the message names its index.
+    """
     if isinstance(item, Part):
         return item
     if not isinstance(item, tuple | list) or not 2 <= len(item) <= 3:
@@ -249,29 +278,40 @@ def _part(i: int, item: Any) -> Part:
 
 
 def _to_axes(tensor: Array) -> tuple[float, ...]:
-    """Quaternion of the smallest turn that brings principal axes to x, y and z."""
+    """Quaternion of the smallest rotation that aligns the principal axes with x, y and z."""
     axes = np.linalg.eigh(tensor)[1].T
-    turns = [
+    rotations = [
         axes[list(order)] * np.array(signs)[:, None]
         for order in permutations(range(3))
         for signs in product((1.0, -1.0), repeat=3)
     ]
-    R = max((turn for turn in turns if np.linalg.det(turn) > 0.0), key=np.trace)
+    R = max((matrix for matrix in rotations if np.linalg.det(matrix) > 0.0), key=np.trace)
     w = 0.5 * math.sqrt(max(1.0 + np.trace(R), 0.0))
     x, y, z = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
     return tuple(round(float(c), 15) for c in (x / (4 * w), y / (4 * w), z / (4 * w), w))
 
 
 def _joined(rows: Array, same: float) -> Array:
-    """Rows of position, weight and edge, of which those with one edge have become their mean."""
+    """Replaces rows at the same position on the edges by their mean.
+
+    Args:
+        rows: [n, 7], position m, weight, position on the edges m.
+        same: m, distance below which two positions count as one.
+
+    Returns:
+        [k, 7], k <= n.
+    """
     edges = rows[:, 4:]
-    apart = np.sqrt(np.sum((edges[:, None] - edges) ** 2, axis=2))
-    first = np.argmax(apart <= same, axis=1)
+    distance = np.sqrt(np.sum((edges[:, None] - edges) ** 2, axis=2))
+    first = np.argmax(distance <= same, axis=1)
     return np.array([rows[first == k].mean(axis=0) for k in np.unique(first)])
 
 
 def _heaviest_side(sets: list[Samples], same: float) -> float:
-    """Largest sum of weights that lie lowest, of the six sides along the axes."""
+    """Largest sum of weights of one of the six sides normal to the axes.
+
+    A side consists of the samples whose height is within `same` m of its lowest sample.
+    """
     positions = np.concatenate([one.positions for one in sets])
     weights = np.concatenate([one.weights for one in sets])
     radii = np.concatenate([np.full(len(one.weights), one.radius) for one in sets])

@@ -1,4 +1,4 @@
-"""Fidelity: the knobs of the trade of speed for accuracy, and its presets."""
+"""Fidelity: the settings that trade speed for accuracy, and their presets."""
 
 from dataclasses import dataclass
 
@@ -12,29 +12,41 @@ FRICTIONS = ("coulomb", "viscous")
 
 @dataclass(frozen=True)
 class Fidelity:
-    """How finely a scene is simulated.
+    """How accurately a scene is simulated.
 
     Args:
-        law: contact law. "spring": the discrete element method, forces from overlaps; "impulse":
-            what it takes for solids not to approach, found by rounds over the contacts. Impulses
-            carry taller towers and larger mass ratios, and instantaneous collisions are exact;
-            springs cost a quarter for single bodies, and tell how an impact runs.
-        geometry: "shape": samples of one body against the exact surface of the other, both ways;
-            "particle": spheres against spheres, any shape, never quite a flat face.
-        damping: of the spring law alone. "overlap": continuous at first touch, restitution
-            independent of where in a step the touch falls; "dashpot": linear, for comparison.
-        friction: "coulomb": static and sliding, with memory; "viscous": in proportion to the slip
-            up to the same limit, which holds nothing still but costs least. Of the spring law.
-        substep: s, the longest step of the integrator.
-        collision_substeps: substeps to a collision step; candidates are looked for once in one,
-            and again within it where a body outruns the skin.
-        contact_resolution: omega h of a contact, in rad a substep: the stiffness follows from it as
-            mass (contact_resolution / substep)^2. Smaller is softer: it resolves an impact better
-            and sinks deeper. At most 0.7 with springs: beyond, a box at rest would chatter. At most
-            2 with impulses, whose towers buckle if it is small: 1.8 is right for them.
-        spacing: of samples, as a fraction of the smallest width of the solid or of any body.
-        rounding: of a box's edges, as a fraction of its smallest half width.
-        skin: m at which a sample becomes a candidate, as a fraction of a body's smallest width.
+        law: contact law. "spring": forces follow from penetrations (discrete element method).
+            "impulse": a sequential-impulse solver computes the impulses that keep solids from
+            approaching each other. Impulses support taller towers and larger mass ratios, and
+            instantaneous collisions are exact. For single bodies springs cost a quarter as much,
+            and they resolve the course of an impact in time.
+        geometry: "shape": samples of each solid against the exact surface of the other.
+            "particle": spheres cover each body, and two bodies touch sphere against sphere; faces
+            are not exactly flat. Compounds need "shape".
+        damping: damping of the spring law. "hunt_crossley": the force is continuous at first
+            contact, and restitution does not depend on when within a substep contact begins.
+            "dashpot": linear damping, for comparison. The impulse law accepts the default only.
+        friction: "coulomb": static and sliding friction; each contact stores its shear. "viscous":
+            force proportional to the slip velocity, up to the same limit; it costs least but cannot
+            hold a body at rest. The impulse law accepts "coulomb" only.
+        substep: s, longest step of the integrator.
+        collision_substeps: substeps per collision step. The broadphase runs once per collision
+            step, and again within it if a body moves farther than the skin allows.
+        contact_resolution: omega h, the phase in rad that the oscillation of a contact advances per
+            substep. The contact stiffness is mass (contact_resolution / substep)^2, with the
+            reduced mass of the pair. A smaller value resolves an impact with more substeps, but
+            contacts are softer and penetrate deeper. At most 0.7 with springs; above that a box at
+            rest would chatter. At most 2 with impulses; 1.8 is recommended, because towers buckle
+            at small values.
+        spacing: largest distance of samples, as a fraction of the smallest width among the solid
+            and all bodies.
+        rounding: radius of a box's edges, as a fraction of the box's smallest half width.
+        skin: separation at which a sample becomes a broadphase candidate, as a fraction of a body's
+            smallest width.
+
+    Raises:
+        TypeError, ValueError: a field is of the wrong type, out of range or not supported by the
+            law.
     """
 
     law: str = "spring"
@@ -57,12 +69,12 @@ class Fidelity:
         for name, only in (("damping", "hunt_crossley"), ("friction", "coulomb")):
             if self.law == "impulse" and getattr(self, name) != only:
                 raise ValueError(
-                    f"Fidelity.{name} {getattr(self, name)!r} belongs to law='spring'; with "
-                    f"law='impulse' leave {name} out"
+                    f"Fidelity.{name} {getattr(self, name)!r} requires law='spring'; with "
+                    f"law='impulse' omit {name}"
                 )
         object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
-        together = integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
-        object.__setattr__(self, "collision_substeps", together)
+        substeps = integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
+        object.__setattr__(self, "collision_substeps", substeps)
         limits = {
             "contact_resolution": (1e-4, 0.7 if self.law == "spring" else 2.0),
             "spacing": (0.01, 1.0),
@@ -76,8 +88,8 @@ class Fidelity:
 
 
 PRESETS: dict[str, Fidelity] = {
-    # of the steps that cut a frame of 40 ms into two collision steps, the longest at which towers
-    # of three stand: at 3.3 and 4 ms they buckle
+    # the longest substep that divides a frame of 40 ms into two collision steps and at which towers
+    # of three cubes stand; at 3.3 ms and 4 ms they buckle
     "fast": Fidelity(substep=0.02 / 7, collision_substeps=7),
     "balanced": Fidelity(),
     "accurate": Fidelity(substep=0.25e-3, contact_resolution=0.2, spacing=0.25),
@@ -86,7 +98,12 @@ PRESETS: dict[str, Fidelity] = {
 
 
 def resolve(fidelity: "str | Fidelity") -> Fidelity:
-    """The fidelity of a preset's name, or the fidelity itself."""
+    """The preset with this name; a Fidelity is returned unchanged.
+
+    Raises:
+        TypeError: neither a string nor a Fidelity.
+        ValueError: no preset has this name.
+    """
     if isinstance(fidelity, Fidelity):
         return fidelity
     if isinstance(fidelity, str):

@@ -1,11 +1,16 @@
-"""Seams: where the boxes of a compound hide each other's faces.
+"""Hidden faces: the areas of a compound's box faces that other boxes of the compound cover.
 
-Where one box stands on the face of another nothing can come through that face, and a sample that
-passes from one to the other must not be pushed out by it. So each box knows the rectangles of its
-faces that others hide. Where such a box reaches to the border of the face or beyond, what is beside
-the border counts as over it too. Where equal compounds are stacked, samples lie on the very seam:
-it counts as a little within the latter of the two boxes, for round-off not to leave a sample to
-both.
+Where one box of a compound touches the face of another, no solid can enter through the covered
+area. A sample that slides from one box to the other must not be pushed out through this area. Each
+box therefore stores the rectangles of its faces that other boxes hide.
+
+If the other box reaches or exceeds an edge of the face, the rectangle extends to infinity beyond
+this edge.
+
+The face plane is shifted by 0.1 % of the boxes' smaller width, out of the earlier box and into the
+later one in the order of the parts. In a stack of identical compounds, samples lie exactly on the
+plane where the two boxes meet. Without the shift, round-off could assign such a sample to both
+boxes.
 """
 
 import math
@@ -18,22 +23,23 @@ import numpy as np
 from physics.scene.part import Part
 from physics.scene.shapes import Box
 
-# how nearly boxes must lie along each other's axes, and share of a width that touching ones may be
-# apart or overlap
+# tolerances: of the entries of the rotation between two boxes with parallel axes, and of the
+# separation or penetration of boxes that touch, as a fraction of the box's width
 _ASKEW, _SAME = 1e-6, 1e-6
-# share of a box's width by which a seam counts as within the latter of two boxes
+# shift of the face plane, as a fraction of the smaller width of the two boxes
 _ASIDE = 1e-3
 
 
 class HiddenFace(NamedTuple):
-    """A rectangle of a box's face that another box hides.
+    """A rectangle of a box's face that another box hides, in the frame of the box.
 
     Attributes:
-        axis: 0 to 2, that the face lies across.
-        sign: 1.0 or -1.0, the face's side.
-        face: m, from the box's centre to where it ends.
-        low: m, lower ends along the next axis and the one after it; -inf beside the border.
-        high: m, upper ends, likewise.
+        axis: 0 to 2, the axis normal to the face.
+        sign: 1.0 or -1.0, direction of the outward normal along the axis.
+        face: m, distance of the shifted face plane from the box's centre.
+        low: m, lower bounds along the two other axes in cyclic order (for axis 1: z, x); -inf if
+            the other box reaches the edge of the face.
+        high: m, upper bounds, likewise; inf if the other box reaches the edge.
     """
 
     axis: int
@@ -44,7 +50,10 @@ class HiddenFace(NamedTuple):
 
 
 def hidden_faces(parts: Sequence[Part]) -> list[list[HiddenFace]]:
-    """What the others hide of each part's faces; only boxes along each other's axes do."""
+    """Hidden faces of each part, one list per part.
+
+    Only boxes hide faces, and only those of boxes whose axes are parallel to their own.
+    """
     found: list[list[HiddenFace]] = [[] for _ in parts]
     for i, j in permutations(range(len(parts)), 2):
         width = min(parts[i].shape.width, parts[j].shape.width)
@@ -52,26 +61,27 @@ def hidden_faces(parts: Sequence[Part]) -> list[list[HiddenFace]]:
     return found
 
 
-def _between(part: Part, other: Part, aside: float) -> list[HiddenFace]:
-    """What another part hides of a part's faces, which count as `aside` m farther out."""
+def _between(part: Part, other: Part, shift: float) -> list[HiddenFace]:
+    """Faces of `part` that `other` hides; their planes are shifted outward by `shift` m."""
     if not isinstance(part.shape, Box) or not isinstance(other.shape, Box):
         return []
-    turn = np.abs(part.rotation.T @ other.rotation)
-    if np.abs(turn - np.round(turn)).max() > _ASKEW:
+    rotation = np.abs(part.rotation.T @ other.rotation)
+    if np.abs(rotation - np.round(rotation)).max() > _ASKEW:
         return []
-    half, theirs = np.array(part.shape.half_extents), turn @ np.array(other.shape.half_extents)
-    middle, same = part.inward(np.array(other.position)), _SAME * part.shape.width
+    # `extents` and `center` are those of the other box, in the frame of this box
+    half, extents = np.array(part.shape.half_extents), rotation @ np.array(other.shape.half_extents)
+    center, same = part.inward(np.array(other.position)), _SAME * part.shape.width
     found = []
     for axis in range(3):
         across = [(axis + 1) % 3, (axis + 2) % 3]
-        low, high = middle[across] - theirs[across], middle[across] + theirs[across]
+        low, high = center[across] - extents[across], center[across] + extents[across]
         if np.any(high < same - half[across]) or np.any(low > half[across] - same):
             continue
         low = np.where(low < same - half[across], -math.inf, low)
         high = np.where(high > half[across] - same, math.inf, high)
         for sign in (-1.0, 1.0):
-            manifold, far = sign * middle[axis] - theirs[axis], sign * middle[axis] + theirs[axis]
-            if manifold < half[axis] + same and far > half[axis] + same:
+            near, far = sign * center[axis] - extents[axis], sign * center[axis] + extents[axis]
+            if near < half[axis] + same and far > half[axis] + same:
                 ends = (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
-                found.append(HiddenFace(axis, sign, float(half[axis]) + aside, *ends))
+                found.append(HiddenFace(axis, sign, float(half[axis]) + shift, *ends))
     return found

@@ -1,10 +1,10 @@
-"""Mass, centre of mass and inertia: of particle sets, of solids, and of bodies put together.
+"""Mass, centre of mass and inertia of particles, simple solids and compounds.
 
-Inertia tensors are [3, 3], kg m^2, about the centre of mass unless a docstring says otherwise.
-Sources: second lecture, "Mass and Inertia Tensor". Two of its formulas are completed here: the
-offsets of a compound's parts are relative to the common centre, with each part's tensor rotated
-into the common frame; and a set of point particles on a line has a singular tensor, so particles
-may be given a radius, which adds each one's own sphere.
+Inertia tensors are [3, 3] in kg m^2, about the centre of mass unless a docstring says otherwise.
+Source: second lecture, "Mass and Inertia Tensor". Two of its formulas are extended here. In a
+compound the offsets of the parts are relative to the common centre of mass, and each part's tensor
+is rotated into the common frame. Point particles on a line have a singular tensor, so particles can
+have a radius, which adds the inertia of a solid sphere to each particle.
 """
 
 from collections.abc import Sequence
@@ -35,8 +35,8 @@ def of_particles(positions: Array, masses: Array, radius: float = 0.0) -> MassPr
     Args:
         positions: [n, 3] m.
         masses: [n] kg.
-        radius: m; each particle counts as a solid sphere of this radius, 0 for points. A single
-            point, or points on a line, have a singular tensor.
+        radius: m; each particle is a solid sphere of this radius; 0 for points. The tensor of a
+            single point, or of points on a line, is singular.
     """
     positions = np.asarray(positions, dtype=float)
     masses = np.asarray(masses, dtype=float)
@@ -51,11 +51,11 @@ def of_particles(positions: Array, masses: Array, radius: float = 0.0) -> MassPr
 def combine(
     parts: Sequence[MassProperties], rotations: Sequence[Array] | None = None
 ) -> MassProperties:
-    """Mass properties of several parts as one body.
+    """Mass properties of one body that consists of several parts.
 
     Args:
-        parts: each with its centre in the common frame.
-        rotations: [3, 3] each, from the part's frame into the common one; identity if omitted.
+        parts: of each part; centres in the common frame, inertia in the part's frame.
+        rotations: [3, 3] of each part, from the part's frame to the common frame; identity if None.
     """
     mass = sum(part.mass for part in parts)
     center = sum((part.mass * np.asarray(part.center) for part in parts), np.zeros(3)) / mass
@@ -67,20 +67,24 @@ def combine(
 
 
 def sphere_inertia(mass: float | Array, radius: float) -> Array:
-    """Solid sphere of mass [...], [..., 3] principal moments."""
+    """Principal moments [..., 3] in kg m^2 of a solid sphere of mass [...] in kg: 2/5 m r^2."""
     return np.multiply.outer(0.4 * mass * radius**2, np.ones(3))
 
 
 def box_inertia(mass: float | Array, half_extents: Array) -> Array:
-    """Solid box of mass [...], [..., 3] principal moments: m/3 (b^2 + c^2) with half extents."""
+    """Principal moments [..., 3] in kg m^2 of a solid box of mass [...] in kg.
+
+    About x: m/3 (b^2 + c^2), with the half extents a, b, c in m; likewise about y and z.
+    """
     a, b, c = np.square(half_extents)
     return np.multiply.outer(mass / 3.0, np.array([b + c, a + c, a + b]))
 
 
 def capsule_inertia(mass: float | Array, radius: float, half_length: float) -> Array:
-    """Solid capsule of mass [...] about its z axis, [..., 3] principal moments.
+    """Principal moments [..., 3] in kg m^2 of a solid capsule of mass [...] in kg along z.
 
-    A cylinder of length 2 l and two half spheres, whose centres of mass lie 3/8 r beyond its ends.
+    The sum of a cylinder of length 2 l and two half spheres. The centre of mass of each half sphere
+    lies 3/8 r beyond the end of the cylinder.
     """
     r, half = radius, half_length
     cylinder = 2.0 * half * r**2

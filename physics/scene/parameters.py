@@ -1,4 +1,4 @@
-"""Parameters: mass, friction, restitution and size of the bodies, by world."""
+"""Parameters: mass, friction, restitution and size of the bodies, for each world."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,13 +14,14 @@ Array = np.ndarray
 
 
 class Parameters(NamedTuple):
-    """What worlds of one scene may differ in, [n, bodies] each.
+    """The quantities that can differ between worlds of one scene.
 
     Attributes:
-        mass: kg.
-        friction: of the body's material, at least 0.
-        restitution: of the body's material, 0 to 1.
-        size: factor of every length of the body's shape; 1 is the shape of the scene.
+        mass: [n, bodies] kg, above 0.
+        friction: [n, bodies], friction coefficient of the body's material, at least 0.
+        restitution: [n, bodies], of the body's material, 0 to 1.
+        size: [n, bodies], factor of every length of the body's shape, above 0; 1 is the shape in
+            the scene.
     """
 
     mass: Array
@@ -30,7 +31,7 @@ class Parameters(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene, count: int = 1) -> "Parameters":
-        """The scene's own, for `count` worlds."""
+        """The values of the scene, repeated for `count` worlds."""
         bodies = scene.bodies
         rows = (
             [b.mass for b in bodies],
@@ -41,20 +42,24 @@ class Parameters(NamedTuple):
         return cls(*(np.tile(np.array(row, dtype=float), (count, 1)) for row in rows))
 
     def pick(self, worlds: Any) -> "Parameters":
-        """Those of the chosen worlds: a mask, indices or a slice."""
+        """The parameters of some worlds, selected by a mask, indices or a slice."""
         return Parameters(*(values[worlds] for values in self))
 
 
 def check_values(given: Mapping[str, Any], worlds: Array, bodies: int) -> dict[str, Array]:
-    """Values [n, bodies] of the parameters that are given.
+    """Checks new parameter values.
 
     Args:
-        given: by name; None where one isn't given.
-        worlds: [n] indices of the worlds that they are for.
-        bodies: in each.
+        given: values by parameter name, broadcast to [n, bodies]; None for a parameter that keeps
+            its values.
+        worlds: [n] indices of the worlds that get the values; error messages name the world.
+        bodies: number of bodies in each world.
+
+    Returns:
+        Arrays [n, bodies] by name, of the parameters that are not None.
 
     Raises:
-        ValueError: numbers of another shape, or one that is not finite or out of its limits.
+        ValueError: values of another shape, not finite or out of range.
     """
     checked = {}
     for name, value in given.items():
@@ -67,11 +72,17 @@ def check_values(given: Mapping[str, Any], worlds: Array, bodies: int) -> dict[s
 
 
 def check_ranges(ranges: Mapping[str, Any], own: Parameters) -> tuple[Parameters, Parameters]:
-    """Low and high ends [1, bodies] of ranges by name; what isn't named is `own` [1, bodies].
+    """Checks ranges of parameters.
+
+    Args:
+        ranges: pairs (low, high) by parameter name; each end is broadcast to [1, bodies].
+        own: [1, bodies], used as both ends of the parameters that `ranges` does not name.
+
+    Returns:
+        Low ends and high ends, [1, bodies] each.
 
     Raises:
-        TypeError, ValueError: no such name, no two ends, ends out of their limits or in the wrong
-            order.
+        TypeError, ValueError: an unknown name; not a pair; an end out of range; low above high.
     """
     if not isinstance(ranges, Mapping):
         raise TypeError(f"ranges must be a dict of name: (low, high), got {ranges!r}")
@@ -79,7 +90,7 @@ def check_ranges(ranges: Mapping[str, Any], own: Parameters) -> tuple[Parameters
     for name, pair in ranges.items():
         choice("ranges", name, RANGES)
         if not isinstance(pair, Sequence | np.ndarray) or isinstance(pair, str) or len(pair) != 2:
-            raise TypeError(f"ranges[{name!r}] must be two ends (low, high), got {pair!r}")
+            raise TypeError(f"ranges[{name!r}] must be a pair (low, high), got {pair!r}")
         for which, end, value in zip(("low", "high"), ends, pair, strict=True):
             values = array(f"ranges[{name!r}] {which}", value, own.mass.shape)
             _check_limits(f"ranges[{name!r}] {which}", name, values)
@@ -95,7 +106,10 @@ def check_ranges(ranges: Mapping[str, Any], own: Parameters) -> tuple[Parameters
 
 
 def _check_limits(field: str, name: str, values: Array, worlds: Array | None = None) -> None:
-    """Refuses values [n, bodies], of the worlds [n] if any, out of a parameter's limits."""
+    """Raises ValueError if one of the values [n, bodies] is out of the parameter's range.
+
+    The message names the world if the indices [n] of the worlds are given.
+    """
     wrong = RANGES[name].excludes(values)
     if wrong.any():
         row, body = (int(i) for i in np.argwhere(wrong)[0])
@@ -104,7 +118,7 @@ def _check_limits(field: str, name: str, values: Array, worlds: Array | None = N
 
 
 def with_parameters(scene: Scene, p: Parameters) -> Scene:
-    """The scene with parameters [1, bodies] built in."""
+    """A copy of the scene whose bodies have the parameters [1, bodies]."""
     bodies = []
     for i, body in enumerate(scene.bodies):
         size = float(p.size[0, i])

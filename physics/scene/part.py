@@ -1,4 +1,4 @@
-"""Part: a sphere, box or capsule as it lies in a compound."""
+"""Part: a sphere, box or capsule with a pose in a compound."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,8 +20,13 @@ class Part:
 
     Args:
         shape: Sphere, Box or Capsule.
-        position: of its centre in the compound's frame, m.
-        orientation: quaternion x, y, z, w, from its own frame to the compound's; it is normalised.
+        position: m, of the part's centre in the compound's frame.
+        orientation: quaternion x, y, z, w, from the part's frame to the compound's; it is
+            normalised, w >= 0.
+
+    Raises:
+        TypeError, ValueError: a field is of the wrong type; a position that is not three finite
+            numbers; a quaternion that is not four finite numbers or has length zero.
     """
 
     shape: Simple
@@ -32,44 +37,47 @@ class Part:
         """Checks every field."""
         instance("Part.shape", self.shape, Sphere, Box, Capsule)
         object.__setattr__(self, "position", vector("Part.position", self.position))
-        turn = unit_quaternion("Part.orientation", self.orientation)
-        object.__setattr__(self, "orientation", turn)
+        orientation = unit_quaternion("Part.orientation", self.orientation)
+        object.__setattr__(self, "orientation", orientation)
 
     @property
     def still(self) -> bool:
-        """Whether its frame is that of the compound."""
+        """Whether the part's frame coincides with the compound's."""
         return not any(self.position) and not any(self.orientation[:3])
 
     @cached_property
     def rotation(self) -> Array:
-        """[3, 3], from its own frame to the compound's."""
+        """Rotation matrix [3, 3] from the part's frame to the compound's."""
         return rotation_matrix(np.array(self.orientation))
 
     @property
     def ends(self) -> tuple[Array, float]:
-        """Corners [n, 3] m of its core in the compound's frame, and the radius m around them."""
+        """Corners [8, 3] m of the core in the compound's frame, and the radius m around them."""
         half, radius = core(self.shape)
         signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         return self.outward(signs * half), radius
 
     @property
     def farthest(self) -> float:
-        """Largest distance in m of a point of its surface from the compound's centre."""
+        """Largest distance in m of a point of the part's surface from the compound's centre."""
         if self.still:
             return self.shape.reach
         points, radius = self.ends
         return float(np.sqrt(np.sum(points**2, axis=1)).max()) + radius
 
     def outward(self, points: Array) -> Array:
-        """Points [..., 3] of its own frame in the compound's."""
+        """Transforms points [..., 3] m from the part's frame to the compound's."""
         return np.array(self.position) + np.einsum("ij,...j->...i", self.rotation, points)
 
     def inward(self, points: Array) -> Array:
-        """Points [..., 3] of the compound's frame in its own."""
+        """Transforms points [..., 3] m from the compound's frame to the part's."""
         return np.einsum("ji,...j->...i", self.rotation, points - np.array(self.position))
 
     def distance(self, points: Array) -> Array:
-        """Distance [...] m of points [..., 3] from its surface, negative inside."""
+        """Distance [...] m of points [..., 3] m from the part's surface, negative inside.
+
+        The points are given in the compound's frame.
+        """
         half, radius = core(self.shape)
         beyond = np.abs(self.inward(points)) - half
         outside = np.sqrt(np.sum(np.maximum(beyond, 0.0) ** 2, axis=-1))
@@ -77,7 +85,11 @@ class Part:
 
 
 def core(shape: Simple) -> tuple[Array, float]:
-    """Half extents [3] m of a shape's core as a box, and the radius m around it."""
+    """Half extents [3] m of a box that is the shape's core, and the radius m around it.
+
+    A box is its own core, with radius 0. The core of a sphere is a point, that of a capsule a line
+    segment along z.
+    """
     if isinstance(shape, Box):
         return np.array(shape.half_extents), 0.0
     return np.array([0.0, 0.0, getattr(shape, "half_length", 0.0)]), shape.radius

@@ -1,16 +1,19 @@
-"""Shapes: what a body looks like to a contact, to a scale and to a camera.
+"""Shapes: the geometry of a solid for contacts, mass properties and rendering.
 
-A shape is a core plus a rounding radius. Its surface is the set of points at that radius from the
-core, its samples lie on the core and each carries a sphere of the radius. A sphere's core is its
-centre and a capsule's its axis. A box is rounded a little, so that an edge that rests on a face has
-a defined normal; its outer faces stay where the user put them.
+A shape is a core plus a rounding radius. Its surface is the set of points at this radius from the
+core. Its samples are points of the core, and each sample makes contact as a sphere of this radius.
+The core of a sphere is its centre, the core of a capsule is its axis. The core of a box is slightly
+inset, so its edges are rounded and an edge that rests on a face has a defined contact normal. The
+outer dimensions of the box do not change.
 
-Samples carry weights. A body's contact stiffness is shared out by them, and they are fixed, so the
-sink under a load depends neither on the number of samples nor on the number that touch. A box's
-weight is spread over corners and edges such that each face has 1 in sum, each edge 3/8 and each
-corner 1/8, at every spacing that samples edges (corners alone have 1/4 each). The inside of a face
-carries no sample in the `shape` geometry: the first touch with it is always a corner or an edge of
-the other body, which has its own.
+Each sample has a weight. The stiffness of a sample is its weight times the contact stiffness of a
+face. Weights do not depend on which samples touch. On a box, the weights of each face sum to 1,
+those of each edge to 3/8, and a corner has 1/8. This holds at every spacing that puts samples on
+the edges, so the penetration of a face under a load does not depend on the number of samples. A box
+with samples at its corners only has 1/4 at each corner.
+
+With `Fidelity.geometry` "shape" the interior of a face has no samples. Another solid touches it
+first with a corner, an edge or a round surface, and that solid's own samples detect the contact.
 """
 
 import math
@@ -24,17 +27,17 @@ from physics.scene.validation import positive, vector
 
 Array = np.ndarray
 
-# kinds of surface that a sample can be tested against
+# kinds of surface that samples are tested against
 PLANE, SPHERE, BOX, CAPSULE, PARTICLES = range(5)
 
 
 class Samples(NamedTuple):
-    """Points that make contact.
+    """Points at which a solid makes contact.
 
     Attributes:
         positions: [n, 3] m in the body frame.
-        weights: [n].
-        radius: m, of all; or [n] of each.
+        weights: [n], dimensionless fractions of a face's contact stiffness.
+        radius: m, one for all samples, or [n] one for each.
     """
 
     positions: Array
@@ -43,7 +46,14 @@ class Samples(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """What samples are tested against: kind, three parameters of the core, rounding radius m."""
+    """A surface that samples are tested against.
+
+    Attributes:
+        kind: PLANE, SPHERE, BOX, CAPSULE or PARTICLES.
+        parameters: m, of the core: the half extents of a box; 0, 0 and the half length of a
+            capsule; the height of a plane, 0 and 0; zeros for the other kinds.
+        radius: m, rounding radius around the core.
+    """
 
     kind: int
     parameters: tuple[float, float, float]
@@ -52,7 +62,7 @@ class Surface(NamedTuple):
 
 @runtime_checkable
 class Shape(Protocol):
-    """What the engine asks of a shape. Frames are centred at the centre of mass."""
+    """The interface of a shape. The origin of a shape's frame is its centre of mass."""
 
     @property
     def volume(self) -> float:
@@ -67,19 +77,32 @@ class Shape(Protocol):
         """Largest distance of a surface point from the centre, in m."""
 
     def inertia(self, mass: float | Array) -> Array:
-        """Principal moments [..., 3] in kg m^2 of the solid with this mass [...] in kg."""
+        """Principal moments [..., 3] in kg m^2 of a homogeneous solid of mass [...] in kg."""
 
     def scaled(self, factor: float) -> "Shape":
-        """The same shape, each length times a factor."""
+        """The shape with each length multiplied by `factor`."""
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """Core samples at most `spacing` m apart, the core inset by `rounding` m."""
+        """Samples of the core, for `Fidelity.geometry` "shape".
+
+        Args:
+            spacing: m, largest distance between neighbouring samples.
+            rounding: m, radius of edges that are otherwise sharp; the core is inset by it.
+        """
 
     def particles(self, spacing: float) -> Samples:
-        """Spheres about `spacing` m wide that cover the surface."""
+        """Spheres that cover the surface, for `Fidelity.geometry` "particle".
+
+        Args:
+            spacing: m, approximate distance between the centres of neighbouring spheres.
+        """
 
     def surface(self, rounding: float) -> Surface:
-        """The exact surface, its edges rounded by `rounding` m where they are sharp."""
+        """The exact surface.
+
+        Args:
+            rounding: m, radius of edges that are otherwise sharp.
+        """
 
 
 @dataclass(frozen=True)
@@ -116,19 +139,19 @@ class Sphere:
         return mass_properties.sphere_inertia(mass, self.radius)
 
     def scaled(self, factor: float) -> "Sphere":
-        """The same shape, each length times a factor."""
+        """The shape with each length multiplied by `factor`."""
         return Sphere(factor * self.radius)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """The centre alone: exact."""
+        """One sample at the centre; it represents the sphere exactly."""
         return Samples(np.zeros((1, 3)), np.ones(1), self.radius)
 
     def particles(self, spacing: float) -> Samples:
-        """One particle: a sphere is one."""
+        """One particle: the sphere itself."""
         return self.samples(spacing, 0.0)
 
     def surface(self, rounding: float) -> Surface:
-        """A point core with the sphere's radius."""
+        """A point as the core, with the sphere's radius."""
         return Surface(SPHERE, (0.0, 0.0, 0.0), self.radius)
 
 
@@ -137,7 +160,7 @@ class Box:
     """A cuboid.
 
     Args:
-        half_extents: (x, y, z) in m, half the width along each body axis, above zero.
+        half_extents: (x, y, z) in m, half of the width along each body axis, above zero.
     """
 
     half_extents: tuple[float, float, float]
@@ -169,15 +192,15 @@ class Box:
         return mass_properties.box_inertia(mass, np.array(self.half_extents))
 
     def scaled(self, factor: float) -> "Box":
-        """The same shape, each length times a factor."""
+        """The shape with each length multiplied by `factor`."""
         x, y, z = self.half_extents
         return Box((factor * x, factor * y, factor * z))
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """Corners, and points along the edges."""
+        """Samples at the corners and along the edges of the inset core."""
         core = np.array(self.half_extents) - rounding
         counts = np.ceil(2.0 * np.array(self.half_extents) / spacing - 1e-9).astype(int)
-        if counts.max() > 1:  # with points on some edges only, faces would differ in weight
+        if counts.max() > 1:  # samples along some edges only would give faces different weights
             counts = np.maximum(counts, 2)
         corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * core
         positions = [corners]
@@ -195,7 +218,11 @@ class Box:
         return Samples(np.concatenate(positions), np.concatenate(weights), rounding)
 
     def particles(self, spacing: float) -> Samples:
-        """A lattice of spheres over the surface; a face has weight 1 in sum if all are alike."""
+        """A lattice of equal spheres over the surface.
+
+        Their diameter is about `spacing` m. All have the same weight. The weights of the face with
+        the most spheres sum to 1.
+        """
         widths = 2.0 * np.array(self.half_extents)
         counts = np.maximum(2, np.round(widths / spacing).astype(int))
         radius = float(np.min(widths / counts)) / 2.0
@@ -211,18 +238,18 @@ class Box:
         return Samples(positions, np.full(len(positions), 1.0 / face), radius)
 
     def surface(self, rounding: float) -> Surface:
-        """A box core inset by the rounding."""
+        """A box as the core, inset by `rounding` m."""
         x, y, z = self.half_extents
         return Surface(BOX, (x - rounding, y - rounding, z - rounding), rounding)
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """A cylinder with half spheres at its ends; its axis is the body's z axis.
+    """A cylinder with a half sphere at each end. Its axis is the body's z axis.
 
     Args:
         radius: m, above zero.
-        half_length: m, half the length of the cylinder without its caps, above zero.
+        half_length: m, half of the length of the cylinder without its caps, above zero.
     """
 
     radius: float
@@ -253,11 +280,14 @@ class Capsule:
         return mass_properties.capsule_inertia(mass, self.radius, self.half_length)
 
     def scaled(self, factor: float) -> "Capsule":
-        """The same shape, each length times a factor."""
+        """The shape with each length multiplied by `factor`."""
         return Capsule(factor * self.radius, factor * self.half_length)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """Points on the axis; lying flat it has weight 1 in sum, on a tip a third or a half."""
+        """Samples on the axis; their weights sum to 1.
+
+        Each end has 1/3, or 1/2 if there are no samples between the ends.
+        """
         count = max(1, math.ceil(2.0 * self.half_length / spacing - 1e-9))
         positions = np.zeros((count + 1, 3))
         positions[:, 2] = np.linspace(-self.half_length, self.half_length, count + 1)
@@ -266,9 +296,9 @@ class Capsule:
         return Samples(positions, weights, self.radius)
 
     def particles(self, spacing: float) -> Samples:
-        """Spheres of the capsule's radius along the axis, at most a radius apart."""
+        """Spheres of the capsule's radius along the axis, at most one radius apart."""
         return self.samples(min(spacing, self.radius), 0.0)
 
     def surface(self, rounding: float) -> Surface:
-        """A segment core with the capsule's radius."""
+        """A line segment as the core, with the capsule's radius."""
         return Surface(CAPSULE, (0.0, 0.0, self.half_length), self.radius)

@@ -1,4 +1,4 @@
-"""Checks of what users pass in. Each error names the field, its value and what would be right."""
+"""Validation of user input. Each error message names the field, its value and what is allowed."""
 
 import math
 from collections.abc import Iterable
@@ -21,11 +21,11 @@ def number(
     high: float = math.inf,
     exclusive: bool = False,
 ) -> float:
-    """`value` as a finite float within low and high, and neither of them if `exclusive`.
+    """Returns `value` as a finite float from low to high, without both limits if `exclusive`.
 
     Raises:
-        TypeError: not a real number (bool counts as none).
-        ValueError: NaN, infinite, or out of range.
+        TypeError: not a real number (a bool is not accepted).
+        ValueError: NaN, infinite or out of range.
     """
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
         raise TypeError(f"{field} must be a number, got {value!r} ({type(value).__name__})")
@@ -43,12 +43,21 @@ def number(
 
 
 def positive(field: str, value: Any) -> float:
-    """`value` as a finite float above zero."""
+    """Returns `value` as a finite float above zero.
+
+    Raises:
+        TypeError, ValueError: see `number`.
+    """
     return number(field, value, low=0.0, exclusive=True)
 
 
 def integer(field: str, value: Any, *, low: int) -> int:
-    """`value` as an int of at least `low`."""
+    """Returns `value` as an int of at least `low`.
+
+    Raises:
+        TypeError: not an integer (a bool is not accepted).
+        ValueError: below `low`.
+    """
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise TypeError(f"{field} must be an integer, got {value!r} ({type(value).__name__})")
     if value < low:
@@ -57,7 +66,12 @@ def integer(field: str, value: Any, *, low: int) -> int:
 
 
 def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
-    """`value` as a tuple of `size` finite floats."""
+    """Returns `value` as a tuple of `size` finite floats.
+
+    Raises:
+        TypeError: not numbers.
+        ValueError: another number of values, or one that is not finite.
+    """
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -71,7 +85,7 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
 
 
 def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
-    """`value` as a quaternion x, y, z, w of length one with w >= 0; q and -q are one rotation.
+    """Returns `value` as a unit quaternion x, y, z, w with w >= 0 (q and -q are the same rotation).
 
     Raises:
         TypeError, ValueError: not four finite numbers; a length of zero.
@@ -88,16 +102,25 @@ def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
 
 
 def text(field: str, value: Any) -> str:
-    """`value` as a text that isn't empty."""
+    """Returns `value` if it is a string that is not empty.
+
+    Raises:
+        TypeError: not a string.
+        ValueError: empty, or only white space.
+    """
     if not isinstance(value, str):
-        raise TypeError(f"{field} must be a text, got {value!r} ({type(value).__name__})")
+        raise TypeError(f"{field} must be a string, got {value!r} ({type(value).__name__})")
     if not value.strip():
         raise ValueError(f"{field} must not be empty, got {value!r}")
     return value
 
 
 def choice(field: str, value: Any, valid: Iterable[str]) -> str:
-    """`value` if it is one of the `valid` names."""
+    """Returns `value` if it is one of the `valid` names.
+
+    Raises:
+        ValueError: it is not; the message suggests a similar name.
+    """
     names = list(valid)
     if not isinstance(value, str) or value not in names:
         near = get_close_matches(str(value), names, n=1)
@@ -107,8 +130,12 @@ def choice(field: str, value: Any, valid: Iterable[str]) -> str:
 
 
 def instance(field: str, value: Any, *types: type) -> Any:
-    """`value` if it is an instance of one of `types`."""
-    # a class has the members of a protocol too
+    """Returns `value` if it is an instance of one of `types`.
+
+    Raises:
+        TypeError: it is not.
+    """
+    # isinstance() with a protocol also accepts a class that has its members
     if isinstance(value, type) or not isinstance(value, types):
         names = " or ".join(t.__name__ for t in types)
         raise TypeError(f"{field} must be {names}, got {value!r} ({type(value).__name__})")
@@ -116,10 +143,14 @@ def instance(field: str, value: Any, *types: type) -> Any:
 
 
 def array(field: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """`value` as a finite float array broadcast to `shape`."""
+    """Returns `value` as a finite float array broadcast to `shape`.
+
+    Raises:
+        ValueError: not numbers, not broadcastable, or not finite.
+    """
     try:
         result = np.asarray(value, dtype=float)
-        if result.ndim and result.size and 0 in shape[1:]:  # of nothing, numbers are too many
+        if result.ndim and result.size and 0 in shape[1:]:  # would broadcast to no values
             raise ValueError
         if result.shape != shape:
             result = np.broadcast_to(result, shape)
@@ -128,7 +159,7 @@ def array(field: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
         shown = f"shape {got}" if got is not None else repr(value)
         raise ValueError(f"{field} must be numbers of shape {shape}, got {shown}") from None
     finite = np.isfinite(result)
-    if np.count_nonzero(finite) < finite.size:  # quicker than all() for the few of a single world
+    if np.count_nonzero(finite) < finite.size:  # faster than all() for small arrays
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
         raise ValueError(f"{field} must be finite, got {result[where]} at index {where}")
     return result

@@ -303,7 +303,7 @@ def test_bad_values_are_named_and_nothing_is_written(values, message):
     ("ranges", "error", "message"),
     [
         ({"weight": (1, 2)}, ValueError, "ranges must be one of ['mass', 'friction'"),
-        ({"mass": 1.0}, TypeError, "ranges['mass'] must be two ends (low, high), got 1.0"),
+        ({"mass": 1.0}, TypeError, "ranges['mass'] must be a pair (low, high), got 1.0"),
         ({"mass": (2.0, 1.0)}, ValueError, "low at most high, got (2, 1) of body 0"),
         ({"mass": (0.0, 1.0)}, ValueError, "ranges['mass'] low must be above 0, got 0 for body 0"),
         ({"restitution": (0, 2)}, ValueError, "ranges['restitution'] high must be at least 0"),

@@ -114,9 +114,7 @@ def test_parts_that_are_none_are_refused_by_name(parts, error, match):
 
 
 def test_particles_of_a_compound_are_refused_by_name():
-    with pytest.raises(
-        ValueError, match=r"Fidelity.geometry 'particle' has no particles for a Com"
-    ):
+    with pytest.raises(ValueError, match=r"Fidelity.geometry 'particle' does not support a Com"):
         World(Scene([Body(T)], [Ground()]), Fidelity(geometry="particle"))
 
 

@@ -70,7 +70,7 @@ def test_each_law_has_its_largest_contact_resolution():
 
 
 def test_damping_by_a_dashpot_belongs_to_the_spring_law():
-    with pytest.raises(ValueError, match=r"Fidelity\.damping 'dashpot' belongs to law='spring'"):
+    with pytest.raises(ValueError, match=r"Fidelity\.damping 'dashpot' requires law='spring'"):
         Fidelity(law="impulse", damping="dashpot")
 
 

@@ -128,5 +128,5 @@ def test_viscous_friction_needs_no_memory():
 
 
 def test_viscous_friction_belongs_to_the_spring_law():
-    with pytest.raises(ValueError, match=r"Fidelity\.friction 'viscous' belongs to law='spring'"):
+    with pytest.raises(ValueError, match=r"Fidelity\.friction 'viscous' requires law='spring'"):
         Fidelity(law="impulse", friction="viscous")
