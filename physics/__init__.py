@@ -1,4 +1,4 @@
-"""A rigid-body engine: bodies sampled by particles, thousands of worlds at once, by numba."""
+"""A rigid-body engine on numba. It simulates thousands of worlds at once on CPU threads."""
 
 from physics.analysis.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged

@@ -1,16 +1,18 @@
-"""Errors of a running simulation."""
+"""Errors that a running simulation raises."""
 
 
 class SimulationDiverged(ArithmeticError):
     """A world's state became infinite or NaN.
 
     Attributes:
-        world: index of the first such world.
-        body: index of its first such body; drives follow the bodies.
-        name: name of that body.
-        time: simulated time in s at which it was detected, at most a collision step late.
+        world: index of the first world that diverged.
+        body: index of the first non-finite body in this world; the indices of drives follow those
+            of the bodies.
+        name: name of this body.
+        time: s, simulated time at which the engine detected it, at most one collision step after
+            the body became non-finite.
         cause: the most likely cause.
-        worlds: indices of all such worlds. The other worlds are unaffected.
+        worlds: indices of all worlds that diverged. The other worlds are unaffected.
     """
 
     def __init__(
@@ -27,10 +29,10 @@ class SimulationDiverged(ArithmeticError):
         )
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickles by parts: worker processes pass errors to their parent."""
+        """Pickles the constructor's arguments, so worker processes can pass the error on."""
         parts = (self.world, self.body, self.name, self.time, self.cause, self.worlds)
         return type(self), parts
 
 
 class ContactOverflow(RuntimeError):
-    """A pair of bodies has more touching particle pairs than there is room for."""
+    """A pair of bodies has more touching particle pairs than the contact buffer can hold."""

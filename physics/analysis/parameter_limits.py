@@ -1,4 +1,4 @@
-"""Per-world parameters that a fidelity's step is too long for are refused before they are used."""
+"""Checks before per-world parameters are used that the substep is short enough for them."""
 
 from typing import Any
 
@@ -13,31 +13,48 @@ Array = np.ndarray
 
 
 class ParameterLimits:
-    """Checks parameters of a scene at a fidelity, and remembers the range that is known as safe."""
+    """Checks parameters of a scene at a fidelity and stores the range that is known to be safe."""
 
     def __init__(self, scene: Scene, fidelity: Fidelity) -> None:
-        """Nothing is known yet."""
+        """Starts without a safe range."""
         self._scene, self._fidelity = scene, fidelity
         self._safe: tuple[Parameters, Parameters] | None = None  # [1, bodies] each
 
     def check_range(self, low: Parameters, high: Parameters, allow_unstable: bool) -> None:
-        """Raises ValueError where the step is too long anywhere in a range [1, bodies]."""
+        """Checks a range of parameters and stores it as the safe range.
+
+        Args:
+            low: [1, bodies], low ends.
+            high: [1, bodies], high ends.
+            allow_unstable: store the range without a check.
+
+        Raises:
+            ValueError: the substep is too long for parameters in the range.
+        """
         if not allow_unstable:
             check_range(self._scene, self._fidelity, low, high)
         self._safe = low, high
 
     def check(self, new: Parameters, worlds: Any) -> None:
-        """Raises ValueError where the step is too long for parameters [n, bodies] of worlds [n]."""
+        """Checks new parameters of some worlds.
+
+        Args:
+            new: [n, bodies].
+            worlds: [n], indices of the worlds.
+
+        Raises:
+            ValueError: the substep is too long for the parameters of a world.
+        """
         low, high = (
             Parameters(*(end(values, axis=0, keepdims=True) for values in new))
             for end in (np.min, np.max)
         )
-        if self._safe is not None:  # and what lies between that range and these
+        if self._safe is not None:  # extend the safe range to the new parameters
             low = Parameters(*map(np.minimum, low, self._safe[0]))
             high = Parameters(*map(np.maximum, high, self._safe[1]))
             if all(map(np.array_equal, (*low, *high), (*self._safe[0], *self._safe[1]))):
                 return
-        try:  # all at once; should that fail, it may be for two that never meet
+        try:  # the whole range first; it may fail for a combination that no world has
             check_range(self._scene, self._fidelity, low, high)
         except ValueError:
             for i, world in enumerate(worlds.tolist()):

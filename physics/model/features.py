@@ -1,29 +1,30 @@
-"""Features: what a scene at a fidelity needs compiled in. Derived, never written by hand.
+"""Features: compile-time switches that the engine derives from a scene and a fidelity.
 
-Counts, sizes and material numbers stay out, so that kernels are few and a sweep compiles nothing.
+Counts, sizes and material values are not features. Scenes that differ only in these share their
+kernels, so a parameter sweep compiles nothing.
 """
 
 from typing import NamedTuple
 
-# how bodies turn: not at all; with the same moment about every axis; in general
+# rotation of bodies: none; with equal principal moments of inertia; general
 NO_ROTATION, ISOTROPIC, GENERAL = range(3)
 
 
 class Features(NamedTuple):
-    """Compile-time switches; each absent one is absent from the machine code and the state.
+    """Compile-time switches. The machine code and the state omit features that are switched off.
 
     Attributes:
-        impulse: the impulse law in place of the spring law.
-        dashpot: linear damping in place of the one continuous in overlap.
-        friction: any pair has friction: tangential law and history.
-        viscous: friction without history.
-        resistance: any pair resists rolling or spinning.
+        impulse: impulse law instead of the spring law.
+        dashpot: linear damping instead of Hunt-Crossley damping.
+        friction: at least one pair has friction; adds the tangential law and its history.
+        viscous: viscous friction, without history.
+        resistance: at least one pair has rolling or spinning resistance.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
-        drives: there are driven tools.
-        gripper: some of them are the fingers of grippers.
-        compound: some surfaces are those of a compound's parts, with frames of their own.
-        varied: worlds have masses, materials and sizes of their own.
+        drives: the scene has drives.
+        gripper: at least two of the drives are the fingers of a gripper.
+        compound: at least one surface is a part of a compound and has its own frame.
+        per_world_parameters: masses, materials and sizes can differ between worlds.
     """
 
     impulse: bool

@@ -1,7 +1,8 @@
-"""Errors against closed forms, for any engine that is read and written as a World is.
+"""Errors compared with closed forms, for any engine that implements `Simulated`, as a World does.
 
-Each measure makes its own scene, of bodies of 1 kg unless it says otherwise, and returns a figure
-that is zero for a perfect engine: relative, or in the unit that its docstring names.
+Each measure builds its own scene, with bodies of 1 kg unless its docstring gives another mass. Most
+measures return an error that is zero for a perfect engine: a relative error, or one in the unit
+that the docstring gives. `make` builds a simulation of one world from a scene.
 """
 
 import math
@@ -30,12 +31,12 @@ Array = np.ndarray
 
 FRICTION = 0.5
 BLOCK = (0.05, 0.05, 0.05)  # m, half extents
-PHASES = 100
-IMPACT = 1.0  # m/s
+PHASES = 100  # times of first contact within a substep, see `rebounds`
+IMPACT = 1.0  # m/s, normal speed
 
 
 class Simulated(Protocol):
-    """What a measure asks of an engine."""
+    """The interface of an engine that the measures use."""
 
     @property
     def position(self) -> Array:
@@ -49,25 +50,25 @@ class Simulated(Protocol):
         """Advances by `time` s."""
 
     def set_state(self, *, linear_velocity: Any) -> None:
-        """Writes velocities in m/s."""
+        """Sets the linear velocities in m/s."""
 
 
 Make = Callable[[Scene], Simulated]
 
 
 def slide(half_extents: tuple[float, float, float], speed: float, make: Make) -> float:
-    """Error of the distance in which a block slides to rest."""
+    """Relative error of the distance that a block slides until it stops, from `speed` m/s."""
     world = make(block_on_ground(half_extents, FRICTION, mass=1.0))
     world.advance(1.0)
     start = float(world.position[0, 0, 0])
     world.set_state(linear_velocity=(speed, 0.0, 0.0))
     world.advance(1.2 * speed / (FRICTION * GRAVITY) + 0.2)
-    way = float(world.position[0, 0, 0]) - start
-    return abs(way / closed_forms.slide_distance(speed, FRICTION, GRAVITY) - 1.0)
+    distance = float(world.position[0, 0, 0]) - start
+    return abs(distance / closed_forms.slide_distance(speed, FRICTION, GRAVITY) - 1.0)
 
 
 def creep(make: Make) -> float:
-    """Speed in m/s at which a cube creeps down 20 degrees, from the first second to the 60th."""
+    """Mean speed in m/s at which a cube creeps down a slope of 20 degrees, from 1 s to 60 s."""
     world = make(block_on_ground(BLOCK, FRICTION, angle=math.radians(20.0), mass=1.0))
     world.advance(1.0)
     start = world.position[0, 0].copy()
@@ -76,9 +77,13 @@ def creep(make: Make) -> float:
 
 
 def acceleration(degrees: float, second: int, make: Make) -> float:
-    """Error of the speed that a cube gains down a slope in its first or second second.
+    """Relative error of the speed that a cube gains on a slope during one second.
 
-    In the first it lands: the force on it takes a few milliseconds to build up.
+    Args:
+        degrees: slope.
+        second: 1, from 0 s to 1 s, when the contact force first takes a few milliseconds to build
+            up; or 2, from 1 s to 2 s.
+        make: see the module.
     """
     angle = math.radians(degrees)
     world = make(block_on_ground(BLOCK, FRICTION, angle=angle, mass=1.0))
@@ -91,7 +96,7 @@ def acceleration(degrees: float, second: int, make: Make) -> float:
 
 
 def roll(make: Make) -> float:
-    """Error of the speed at which a ball rolls that was set off sliding at 1 m/s."""
+    """Relative error of the rolling speed of a ball that starts to slide at 1 m/s without spin."""
     world = make(sphere_on_ground(0.05, FRICTION, mass=1.0))
     world.advance(1.0)
     world.set_state(linear_velocity=(1.0, 0.0, 0.0))
@@ -100,7 +105,10 @@ def roll(make: Make) -> float:
 
 
 def rebounds(restitution: float, fidelity: Fidelity) -> Array:
-    """Speeds after over before an impact, [PHASES], first touch spread evenly over a substep."""
+    """Ratios [PHASES] of the speeds after and before an impact of a ball of 0.1 kg.
+
+    The times of first contact are spread evenly over one substep.
+    """
     scene = sphere_on_ground(0.05, friction=0.0, restitution=restitution, gravity=0.0)
     world = World(scene, fidelity, count=PHASES, threads=1)
     height = 0.055 + IMPACT * fidelity.substep * np.arange(PHASES) / PHASES
@@ -111,7 +119,11 @@ def rebounds(restitution: float, fidelity: Fidelity) -> Array:
 
 
 def oblique(friction: float, along: float, make: Make) -> float:
-    """Error of the speed along the ground of a ball that hits it at 1 m/s, e = 0.5, no gravity."""
+    """Relative error of the speed along the ground of a ball after an oblique impact.
+
+    The ball hits the ground at 1 m/s, plus `along` m/s along the ground, with e = 0.5 and without
+    gravity.
+    """
     scene = sphere_on_ground(
         0.1, friction, 0.5, gravity=0.0, position=(0.0, 0.0, 0.11),
         linear_velocity=(along, 0.0, -IMPACT), mass=1.0,
@@ -129,9 +141,17 @@ def grazing(
     fidelity: str | Fidelity,
     count: int = 1000,
 ) -> World:
-    """Worlds of one body over the ground, or of two, on random paths that just meet.
+    """Worlds without gravity in which bodies collide on random, often grazing paths.
 
-    Shapes of at most 4 cm; no gravity. All have met, or missed, within 0.3 s.
+    One body moves towards the ground, or the first of two bodies moves past or into the second.
+    Masses are 0.1 kg and 0.2 kg, spins are random. All collisions happen within 0.3 s.
+
+    Args:
+        shapes: one or two, of at most 4 cm.
+        restitution: of all solids.
+        friction: of all solids.
+        fidelity: of the worlds.
+        count: number of worlds.
     """
     rng = np.random.default_rng(0)
     material = Material(friction, restitution)
@@ -139,7 +159,7 @@ def grazing(
         Body(shape, mass=0.1 * (i + 1), position=(0.2 * i, 0, 0.1), material=material)
         for i, shape in enumerate(shapes)
     ]
-    # two bodies never come near it; it is there so that they take no kernel of their own
+    # two bodies never reach the ground; with it their scene uses kernels that others use, too
     ground = Ground(material, 0.0 if len(shapes) == 1 else -10.0)
     world = World(Scene(bodies, [ground], gravity=(0, 0, 0)), fidelity, count, threads=1)
     velocity, position = np.zeros((2, count, len(shapes), 3))
@@ -151,9 +171,9 @@ def grazing(
     else:
         to = rng.normal(size=(count, 3))
         to /= np.linalg.norm(to, axis=-1, keepdims=True)
-        aside = np.cross(to, rng.normal(size=(count, 3)))
-        aside *= rng.uniform(0, 0.06, (count, 1)) / np.linalg.norm(aside, axis=-1, keepdims=True)
-        velocity[:, 0], position[:, 0] = to, -0.09 * to + aside
+        offset = np.cross(to, rng.normal(size=(count, 3)))
+        offset *= rng.uniform(0, 0.06, (count, 1)) / np.linalg.norm(offset, axis=-1, keepdims=True)
+        velocity[:, 0], position[:, 0] = to, -0.09 * to + offset
     world.set_state(
         position=position, linear_velocity=velocity,
         angular_velocity=rng.uniform(-20, 20, velocity.shape),
@@ -163,7 +183,10 @@ def grazing(
 
 
 def energy_gain(world: World, time: float = 0.3) -> float:
-    """Largest share by which the kinetic energy of any world ever exceeds that at the start."""
+    """Largest relative increase of a world's kinetic energy over its initial value.
+
+    The energy is read 15 times in `time` s.
+    """
     before = world.kinetic_energy()
     gain = -math.inf
     for _ in range(15):
@@ -173,7 +196,13 @@ def energy_gain(world: World, time: float = 0.3) -> float:
 
 
 class Standing(NamedTuple):
-    """How a tower of 4 cm cubes stands: drift and lean in m, sink of the topmost in m."""
+    """How a tower of 4 cm cubes stands.
+
+    Attributes:
+        drift: m, largest displacement of a cube along an axis.
+        lean: m, largest distance of a cube along x or y from the tower's axis.
+        sink: m by which the top cube is lower than in a tower without penetration.
+    """
 
     drift: float
     lean: float
@@ -181,7 +210,7 @@ class Standing(NamedTuple):
 
 
 def stand(cubes: int, time: float, make: Make) -> Standing:
-    """Largest drift in `time` s after the first second, and lean and sink at its end."""
+    """How a tower of 64 g cubes stands: drift from 1 s to 1 s + `time`, and lean and sink then."""
     world = make(tower(cubes))
     world.advance(1.0)
     start = world.position[0].copy()
@@ -195,7 +224,10 @@ def stand(cubes: int, time: float, make: Make) -> Standing:
 
 
 def wave_speed(fidelity: str | Fidelity, stones: int = 12, gap: float = 0.03) -> float:
-    """Speed in m/s at which a row of dominoes falls, over its second half."""
+    """Speed in m/s of the wave of falling dominoes, over the second half of the row.
+
+    The centres of the `stones` dominoes of 20 g are `gap` m apart.
+    """
     world = World(dominoes(stones, gap), fidelity, threads=1)
     world.advance(1.5)
     touched = [float(world.first_touch(i, i + 1)[0]) for i in range(stones - 1)]

@@ -1,4 +1,4 @@
-"""Scenes whose motion has a closed form, and scenes that stand for the tasks.
+"""Scenes whose motion has a closed form, and scenes that resemble the tasks.
 
 Gravity is tilted instead of the ground: an incline of angle theta is a level plane on which g has
 the component g sin(theta) along +x.
@@ -22,18 +22,21 @@ from physics.world import World
 GRAVITY = 9.81  # m/s^2
 CUBE = Box((0.02, 0.02, 0.02))
 BALL = Sphere(0.02)
-FAR_BELOW = -1e3  # m, height of a ground that is never reached
+FAR_BELOW = -1e3  # m, height of a ground that no body reaches
 
 
 def tilted_gravity(angle: float, gravity: float = GRAVITY) -> Vector:
-    """Gravity in m/s^2 on a ground that falls off along +x by `angle` rad."""
+    """Gravity in m/s^2 on a ground that slopes down along +x by `angle` rad."""
     return (gravity * math.sin(angle), 0.0, -gravity * math.cos(angle))
 
 
 def _on_ground(
     shape: Shape, height: float, material: Material, gravity: Vector, **body: Any
 ) -> Scene:
-    """A body of 0.1 kg with its centre at `height` m over a ground of the same material."""
+    """A body with its centre at `height` m above a ground of the same material.
+
+    `body` has further fields of the Body; its mass is 0.1 kg by default. Gravity is in m/s^2.
+    """
     body = {"mass": 0.1, "position": (0.0, 0.0, height), **body}
     return Scene([Body(shape, material=material, **body)], [Ground(material)], gravity=gravity)
 
@@ -46,22 +49,32 @@ def block_on_ground(
     stiffness: float | None = None,
     **body: Any,
 ) -> Scene:
-    """A block of 0.1 kg that stands on a level ground, or on one inclined by `angle` rad."""
+    """A block on the ground, which is level or inclined by `angle` rad.
+
+    Half extents are in m, stiffness is in N/m. `body` has further fields of the Body; its mass is
+    0.1 kg by default.
+    """
     material = Material(friction, restitution, stiffness)
     gravity = tilted_gravity(angle)
     return _on_ground(Box(half_extents), half_extents[2], material, gravity, **body)
 
 
 def landing_cube(on: str, restitution: float, friction: float = 0.0, along: float = 0.0) -> Scene:
-    """A cube that lands at 1 m/s, without gravity, on its "face", "edge" or "corner".
+    """A cube without gravity that hits the ground at 1 m/s with a face, an edge or a corner.
 
-    What lands first lies straight below the centre; `along` m/s is the speed over the ground.
+    The centre of this face, edge or corner is vertically below the centre of the cube.
+
+    Args:
+        on: "face", "edge" or "corner".
+        restitution: of cube and ground.
+        friction: of cube and ground.
+        along: m/s, horizontal speed.
     """
     half = CUBE.half_extents[0]
     corners = {"face": (0.0, 0.0, 1.0), "edge": (0.0, 1.0, 1.0), "corner": (1.0, 1.0, 1.0)}
     lowest = np.array(corners[on])
     reach = half * float(np.linalg.norm(lowest))
-    # the turn by which `lowest` comes to point down, the shortest but for the face's half turn
+    # smallest rotation that makes `lowest` point down; for a face, half a revolution about x
     axis = np.cross(lowest, (0.0, 0.0, -1.0))
     axis = axis if axis.any() else np.array([1.0, 0.0, 0.0])
     angle = math.acos(-lowest[2] * half / reach)
@@ -82,13 +95,17 @@ def sphere_on_ground(
     stiffness: float | None = None,
     **body: Any,
 ) -> Scene:
-    """A ball of 0.1 kg that touches the ground, level or inclined by `angle` rad."""
+    """A ball that touches the ground, which is level or inclined by `angle` rad.
+
+    The radius is in m, gravity in m/s^2, stiffness in N/m. `body` has further fields of the Body;
+    its mass is 0.1 kg by default.
+    """
     material = Material(friction, restitution, stiffness)
     return _on_ground(Sphere(radius), radius, material, tilted_gravity(angle, gravity), **body)
 
 
 def capsule_on_ground(radius: float = 0.02, half_length: float = 0.03) -> Scene:
-    """A capsule of 0.1 kg that lies on the ground along x."""
+    """A capsule of 0.1 kg that lies on the ground along x; radius and half length in m."""
     lying = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
     material = Material(0.5, 0.0)
     shape = Capsule(radius, half_length)
@@ -96,7 +113,10 @@ def capsule_on_ground(radius: float = 0.02, half_length: float = 0.03) -> Scene:
 
 
 def push_like(cube_mass: float = 0.1, force_limit: float = 20.0, friction: float = 0.5) -> Scene:
-    """A cube on the ground and a ball-shaped tool 5 cm behind it along -x."""
+    """A cube on the ground and a spherical drive 5 cm from its centre, along -x.
+
+    The mass is in kg, the force limit of the drive in N.
+    """
     material = Material(friction, 0.0)
     return Scene(
         [Body(CUBE, mass=cube_mass, position=(0.0, 0.0, 0.02), material=material)],
@@ -115,9 +135,9 @@ def two_cubes(
     """Two cubes of 0.1 kg, 6 cm apart along x, by default in free space.
 
     Args:
-        first: fields of the first Body that differ.
-        second: fields of the second Body that differ.
-        material: of everything.
+        first: fields of the first Body that override the defaults.
+        second: fields of the second Body that override the defaults.
+        material: of the cubes and the ground; friction 0.5 and restitution 0.5 if None.
         ground: m, height of the ground.
         gravity: m/s^2.
     """
@@ -133,19 +153,19 @@ def two_cubes(
 
 
 def tower(cubes: int, jitter: float = 2e-4, seed: int = 0) -> Scene:
-    """Equal cubes of 64 g, one on the other, each set down within `jitter` m of the axis."""
-    aside = np.random.default_rng(seed).uniform(-jitter, jitter, (cubes, 2))
+    """A tower of equal cubes of 64 g, with random offsets along x and y of at most `jitter` m."""
+    offsets = np.random.default_rng(seed).uniform(-jitter, jitter, (cubes, 2))
     half = CUBE.half_extents[2]
     material = Material(0.5, 0.0)
     bodies = [
         Body(CUBE, mass=0.064, position=(x, y, (2 * i + 1) * half), material=material)
-        for i, (x, y) in enumerate(aside)
+        for i, (x, y) in enumerate(offsets)
     ]
     return Scene(bodies, [Ground(material)])
 
 
 def pyramid(rows: int) -> Scene:
-    """Cubes of 64 g in a wall, each over the gap of 2 mm between two below it."""
+    """A wall of 64 g cubes, each above the gap of 2 mm between two cubes of the row below."""
     width, material = 2.0 * CUBE.half_extents[2], Material(0.5, 0.0)
     bodies = [
         Body(
@@ -161,17 +181,20 @@ def pyramid(rows: int) -> Scene:
 
 
 def heavy_top(ratio: float) -> Scene:
-    """Two cubes, the upper one so many times denser than the lower one of 64 g."""
+    """Two stacked cubes: the lower one of 64 g, the upper one `ratio` times as heavy."""
     material = Material(0.5, 0.0)
     bodies = [
-        Body(CUBE, mass=mass, position=(aside, 0.5 * aside, height), material=material)
-        for mass, aside, height in ((0.064, 0.0, 0.02), (0.064 * ratio, 2e-4, 0.06))
+        Body(CUBE, mass=mass, position=(offset, 0.5 * offset, height), material=material)
+        for mass, offset, height in ((0.064, 0.0, 0.02), (0.064 * ratio, 2e-4, 0.06))
     ]
     return Scene(bodies, [Ground(material)])
 
 
 def dominoes(count: int, gap: float = 0.03) -> Scene:
-    """Stones of 8 by 24 by 50 mm, `gap` m from centre to centre, the first one toppling."""
+    """A row of dominoes of 8 by 24 by 50 mm, of which the first one topples.
+
+    Their centres are `gap` m apart.
+    """
     half = (0.004, 0.012, 0.025)
     stone, ground = Material(0.3, 0.0), Material(0.6, 0.0)
     first: dict[str, Any] = {
@@ -192,20 +215,20 @@ def dominoes(count: int, gap: float = 0.03) -> Scene:
 
 
 def leaning_cards(angle: float) -> Scene:
-    """Two cards of 2 by 60 by 90 mm that lean against each other, `angle` rad off the vertical."""
+    """Two cards of 2 by 60 by 90 mm that lean against each other, `angle` rad from vertical."""
     thick, half = 0.001, (0.001, 0.03, 0.045)
     material = Material(0.6, 0.0)
     height = half[2] * math.cos(angle) + thick * math.sin(angle)
-    aside = half[2] * math.sin(angle) + thick * math.cos(angle)
+    offset = half[2] * math.sin(angle) + thick * math.cos(angle)
     bodies = [
         Body(
             Box(half),
             mass=0.002,
-            position=(way * (aside + 1e-6), 0.0, height),
-            orientation=(0.0, -way * math.sin(angle / 2), 0.0, math.cos(angle / 2)),
+            position=(side * (offset + 1e-6), 0.0, height),
+            orientation=(0.0, -side * math.sin(angle / 2), 0.0, math.cos(angle / 2)),
             material=material,
         )
-        for way in (-1.0, 1.0)
+        for side in (-1.0, 1.0)
     ]
     return Scene(bodies, [Ground(material)])
 
@@ -214,7 +237,11 @@ def torque_free_box(
     angular_velocity: Vector = (3.0, 0.0, 5.0),
     half_extents: tuple[float, float, float] = (0.03, 0.02, 0.01),
 ) -> Scene:
-    """A box that spins in free space; its moments rise from x to z."""
+    """A box that rotates in free space.
+
+    The angular velocity is in rad/s, half extents are in m. With the default half extents the
+    moments of inertia increase from x to z.
+    """
     body = Body(Box(half_extents), mass=0.1, angular_velocity=angular_velocity)
     return Scene([body], [Ground(height=FAR_BELOW)], gravity=(0.0, 0.0, 0.0))
 
@@ -222,7 +249,7 @@ def torque_free_box(
 def settled(
     scene: Scene, fidelity: str | Fidelity = "balanced", count: int = 1, time: float = 1.0
 ) -> World:
-    """Worlds of a scene after `time` s, in which what lies on the ground comes to rest."""
+    """Worlds of a scene after `time` s; by default long enough for bodies to come to rest."""
     world = World(scene, fidelity, count)
     world.advance(time)
     return world

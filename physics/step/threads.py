@@ -1,9 +1,11 @@
-"""How worlds are shared out over threads.
+"""Distributes worlds over threads.
 
-Kernels release the GIL, so plain Python threads run them side by side, and blocks of groups go to
-whichever thread is free. One kernel serves one world and thousands. Unlike a runtime with threads
-of its own inside the kernel, this survives a fork (the pool is made on first use, anew in a child),
-runs under several Python threads at once, and takes any number of threads on any number of cores.
+Kernels release the GIL, so Python threads run them in parallel. Each thread takes the next block of
+lane groups as soon as it is free. The same kernel serves one world and thousands of worlds.
+
+Kernels with their own thread runtime (numba's `parallel=True`) have limits that this design avoids.
+It works after a fork, because each process creates its thread pool on first use. Several Python
+threads can call it at the same time. The number of threads is independent of the number of cores.
 """
 
 import os
@@ -12,7 +14,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 from physics.scene.validation import integer
 
-# fewer groups than this run in the caller's thread: waking another costs tens of microseconds
+# lane groups in a block, at least; with fewer groups only the caller's thread runs, because waking
+# another thread costs tens of microseconds
 _BLOCK = 8
 
 _pools: dict[int, ThreadPoolExecutor] = {}
@@ -20,32 +23,42 @@ os.register_at_fork(after_in_child=_pools.clear)
 
 
 def default_threads() -> int:
-    """Cores that this process may run on."""
+    """Number of cores that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_threads(threads: int | None) -> int:
-    """Number of threads asked for; all cores if None."""
+    """The requested number of threads; the number of cores if None.
+
+    Raises:
+        TypeError, ValueError: not an integer, or below 1.
+    """
     return default_threads() if threads is None else integer("threads", threads, low=1)
 
 
 def run_in_blocks(run: Callable[[int, int], int], count: int, threads: int) -> int:
-    """Sum of run(first, last) over blocks that cover the groups 0 <= g < count, on threads."""
+    """Calls run(first, last) for blocks of lane groups and returns the sum of the results.
+
+    Args:
+        run: processes the groups first <= g < last.
+        count: number of groups; the blocks cover 0 <= g < count.
+        threads: largest number of threads, the caller's included.
+    """
     threads = min(threads, -(-count // _BLOCK))
     if threads == 1:
         return run(0, count)
     block = max(_BLOCK, -(-count // (8 * threads)))
     firsts = iter(range(0, count, block))
 
-    def workspace() -> int:
-        # next() on a range iterator is atomic under the GIL
+    def run_blocks() -> int:
+        # the threads share `firsts`: next() on a range iterator is atomic under the GIL
         return sum(run(first, min(first + block, count)) for first in firsts)
 
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="worlds")
-    others = [_pools[threads].submit(workspace) for _ in range(threads - 1)]
+    futures = [_pools[threads].submit(run_blocks) for _ in range(threads - 1)]
     try:
-        failed = workspace()
-    finally:  # no thread may still write when the caller hears of an error
-        wait(others)
-    return failed + sum(other.result() for other in others)
+        total = run_blocks()
+    finally:  # all threads must have stopped writing before an error reaches the caller
+        wait(futures)
+    return total + sum(future.result() for future in futures)

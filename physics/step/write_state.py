@@ -1,4 +1,4 @@
-"""Writes poses and velocities that a user gives into the state of chosen worlds."""
+"""Writes poses and velocities from the user into the state of selected worlds."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,19 +13,19 @@ Array = np.ndarray
 
 
 def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array) -> None:
-    """Writes any part of the state of the worlds of a mask, and clears what is hidden in them.
+    """Writes parts of the state of selected worlds, and clears their hidden contact state.
 
     Args:
-        simulation: whose state.
-        given: by the names of `World.set_state`; None for what stays.
-        worlds: mask [count].
+        simulation: the simulation to change.
+        given: values by argument name of `World.set_state`; None for values that stay unchanged.
+        worlds: mask [count] of the selected worlds.
 
     Raises:
-        ValueError: see `World.set_state`; nothing is written then.
+        ValueError: see `World.set_state`; the state is then unchanged.
     """
     new = _checked(simulation, given, int(worlds.sum()))
     state, bodies, chosen = simulation.state, simulation.bodies, np.flatnonzero(worlds)
-    # what isn't given stays: the spin, not its momentum, where only the orientation changes
+    # if only the orientation changes, the angular velocity stays and the angular momentum changes
     angular_velocity = new.get("angular_velocity")
     if angular_velocity is None and "orientation" in new:
         turning = state.dynamic["angular_momentum"][worlds].any()
@@ -38,10 +38,10 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
         inverse = simulation.of_bodies("inverse_mass", chosen)
         state.dynamic["momentum"][worlds, :bodies] = new["linear_velocity"] / inverse[..., None]
     if angular_velocity is not None:
-        turn = state.dynamic["orientation"][worlds, :bodies]
+        orientation = state.dynamic["orientation"][worlds, :bodies]
         inertia = simulation.of_bodies("inertia", chosen)
         state.dynamic["angular_momentum"][worlds, :bodies] = angular_momentum_of(
-            inertia, turn, angular_velocity
+            inertia, orientation, angular_velocity
         )
     if "drive_position" in new:
         state.dynamic["position"][worlds, bodies:] = new["drive_position"]
@@ -56,7 +56,19 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
 
 
 def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> dict[str, Array]:
-    """What is given as arrays [chosen, ...], unit quaternions included."""
+    """Checks the given values and broadcasts them to arrays [chosen, ...].
+
+    Args:
+        simulation: see `write_state`.
+        given: see `write_state`.
+        chosen: number of selected worlds.
+
+    Returns:
+        Arrays by name, of the values that are not None; orientations have length one.
+
+    Raises:
+        ValueError: see `World.set_state`.
+    """
     bodies, drives = simulation.bodies, len(simulation.scene.driven_bodies)
     sizes = {
         "position": (bodies, 3),
@@ -78,26 +90,30 @@ def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> d
     if simulation.features.rotation == NO_ROTATION and spins:
         raise ValueError(
             "angular_velocity must be zero in a scene of frictionless balls at rest, where "
-            "rotation isn't simulated; give a body its spin in the Scene"
+            "rotation is not simulated; set the angular_velocity of a Body in the Scene instead"
         )
     for name in ("drive_position", "drive_velocity"):
         for first, _ in simulation.scene.grippers if name in new else ():
             one, other = new[name][:, first, ::2], new[name][:, first + 1, ::2]
             if np.any(one != other):
                 raise ValueError(
-                    f"{name} must have the same x and z for both fingers of a gripper, tools "
+                    f"{name} must have the same x and z for both fingers of a gripper, drives "
                     f"{first} and {first + 1}, which are one solid along these axes"
                 )
     return new
 
 
 def _unit(quaternion: Array) -> Array:
-    """Quaternions [..., 4] of length one; those of length zero raise ValueError."""
-    # of the largest entry first: squares of large ones overflow
+    """Quaternions [..., 4] scaled to length one.
+
+    Raises:
+        ValueError: a quaternion has length zero.
+    """
+    # divide by the largest entry first, because the squares of large entries overflow
     largest = np.abs(quaternion).max(axis=-1, keepdims=True)
     if np.any(largest < 1e-12):
         raise ValueError(
             "orientation holds a quaternion of length zero; no rotation is (0, 0, 0, 1)"
         )
-    turn = quaternion / largest
-    return np.asarray(turn / np.sqrt(np.sum(turn**2, axis=-1, keepdims=True)))
+    scaled = quaternion / largest
+    return np.asarray(scaled / np.sqrt(np.sum(scaled**2, axis=-1, keepdims=True)))
