@@ -1,4 +1,4 @@
-"""How kernels are compiled: only this file and `compiled_once` know numba's options.
+"""How kernels are compiled: only this file and `linking` know numba's options.
 
 There are three kinds of compiled functions:
 - a `stage` is inlined into its caller: a stage of the substep, or a formula in its loop over lanes;
@@ -27,7 +27,7 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
-from physics.compiled_once import Linked
+from physics.linking import Linked
 
 Array = np.ndarray
 

@@ -78,7 +78,7 @@ class World:
             check_step(scene, self.fidelity, self._simulation.base, self.features)
         self._limits = ParameterLimits(scene, self.fidelity)
         self._solids = Solids(scene.solid_names, self._simulation.base)
-        self._span = 0.0
+        self._span = float("nan")  # s, length of the last frame
 
     def __repr__(self) -> str:
         """Names the contents of the world."""

@@ -137,14 +137,14 @@ def _check_stiffness(scene: Scene, fidelity: Fidelity, model: Model, features: F
     if not given:
         return
     h = fidelity.substep
-    step, binding = _safe_step(scene, fidelity, model, features)
+    step, limiting = _safe_step(scene, fidelity, model, features)
     if h > step:
         for _ in range(8):  # the damping of friction depends slightly on the step
             model, _ = build(scene, replace(fidelity, substep=step))
-            step, binding = _safe_step(scene, fidelity, model, features)
+            step, limiting = _safe_step(scene, fidelity, model, features)
         raise ValueError(
             f"Material.stiffness {max(given):g} N/m makes the substep of {h:g} s unstable: "
-            f"{binding} limits it, and the largest safe step is {_below(step)} s; lower the "
+            f"{limiting} limits it, and the largest safe step is {_below(step)} s; lower the "
             "stiffness, shorten Fidelity.substep, or build the World with allow_unstable=True"
         )
 
@@ -153,11 +153,11 @@ def cause_of_divergence(
     scene: Scene, fidelity: Fidelity, model: Model, features: Features, h: float
 ) -> str:
     """The likely cause of worlds becoming non-finite at a substep of h s."""
-    step, binding = _safe_step(scene, fidelity, model, features)
+    step, limiting = _safe_step(scene, fidelity, model, features)
     if h > step and _given_stiffness(scene):
         return (
             f"the substep of {h:g} s is longer than the largest safe one, {_below(step)} s, which "
-            f"{binding} limits"
+            f"{limiting} limits"
         )
     return "a state, speed or force too large for double precision"
 

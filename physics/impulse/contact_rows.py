@@ -133,8 +133,20 @@ def make_prepare(features, kind):
 @cache
 def make_contact_rows(features):
     """Stage that writes the contact rows of a half-pair."""
-    box, compound = features.box, features.compound
-    prepare = by_surface_kind(features, lambda kind: make_prepare(features, kind))
+    of_kind = by_surface_kind(features, lambda kind: make_contact_rows_of_kind(features, kind))
+
+    @stage
+    def contact_rows(model, state, workspace, g, k, updates_memory, h):
+        of_kind(model.half_pair[k].kind, model, state, workspace, g, k, updates_memory, h)
+
+    return contact_rows
+
+
+@cache
+def make_contact_rows_of_kind(features, kind):
+    """The same, for half-pairs whose surface is of one kind."""
+    plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    prepare = make_prepare(features, kind)
 
     @stage
     def contact_rows(model, state, workspace, g, k, updates_memory, h):
@@ -142,16 +154,15 @@ def make_contact_rows(features):
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
         frame = workspace.solid[constants.frame] if compound else surface
         A, B = workspace.tensor[constants.owner].entry, workspace.tensor[constants.surface].entry
-        first, kind = constants.first_slot, constants.kind
+        first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         points = workspace.contact_row[first : first + slots]
-        relative = owner if kind == PLANE else workspace.relative[0]
-        if kind != PLANE:
+        relative = owner if plane else workspace.relative[0]
+        if not plane:
             relative_pose(owner, frame, relative)
-        if compound and box and kind == BOX:
+        if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
         prepare(
-            kind,
             slots,
             candidate,
             relative,

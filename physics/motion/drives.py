@@ -34,14 +34,14 @@ def make_drives(features):
                 limit, partner = constants.force_limit, constants.gripper_partner
                 c, v, force = solid.position, solid.velocity, solid.force
                 reference, velocity = solid.reference, solid.reference_velocity
-                left = solid.reference_time
+                left, per_h = solid.reference_time, 1.0 / h if h > 0.0 else 0.0
                 for axis in range(3):
                     grips = gripper and partner >= 0 and axis == CLOSING
                     most = 1e300 if grips else limit
                     for i in range(LANES):
                         # fraction of the substep for which the set point still moves
                         whole = left[i] > (1.0 - _SAME_STEP) * h
-                        moving = 1.0 if whole else max(left[i], 0.0) / max(h, 1e-300)
+                        moving = 1.0 if whole else max(left[i], 0.0) * per_h
                         ahead = reference[axis, i] + h * (moving * velocity[axis, i])
                         reference[axis, i] = ahead
                         pull = stiffness * (ahead - c[axis, i])

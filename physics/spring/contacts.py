@@ -23,33 +23,44 @@ _LEAST_FORCE = 1e-200
 @cache
 def make_half_pair(features, report):
     """Stage that computes the forces of one half-pair, and adds its wrenches to both solids."""
-    box, compound = features.box, features.compound
-    only_planes = not (box or features.sphere or features.capsule or features.particles)
-    begin_half_pair = make_begin_half_pair(features)
-    correct_energy = make_energy_correction(features)
-    contact_loop = by_surface_kind(features, lambda kind: make_contact_loop(features, kind, report))
+    of_kind = by_surface_kind(features, lambda kind: make_half_pair_of_kind(features, kind, report))
 
     @stage
     def half_pair(model, state, workspace, rows, g, k, h):
-        constants, live = model.half_pair[k], workspace.half_pair[k]
-        kind, slots, first = constants.kind, live.slots, constants.first_slot
+        of_kind(model.half_pair[k].kind, model, state, workspace, rows, g, k, h)
+
+    return half_pair
+
+
+@cache
+def make_half_pair_of_kind(features, kind, report):
+    """The same, for half-pairs whose surface is of one kind."""
+    plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    begin_half_pair = make_begin_half_pair(features)
+    correct_energy = make_energy_correction(features)
+    contact_loop = make_contact_loop(features, kind, report)
+
+    @stage
+    def half_pair(model, state, workspace, rows, g, k, h):
+        constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
         frame = workspace.solid[constants.frame] if compound else surface
+        first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
         # a plane is described in the world frame, in which the owner already is
-        relative = owner if only_planes or kind == PLANE else workspace.relative[0]
+        relative = owner if plane else workspace.relative[0]
         begin_half_pair(model, workspace, k, h, relative)
-        if not only_planes and kind != PLANE:
+        if not plane:
             relative_pose(owner, frame, relative)
             relative_velocities(owner, frame, relative)
-            if compound and box and kind == BOX:
-                mark_hidden_faces(model, k, candidate, relative)
-            # before the loop, which remembers the present faces; a refresh has no step
-            if box and kind == BOX and constants.face_normals == 0 and h > 0.0:
-                correct_energy(slots, candidate, relative, constants, h)
-        contact_loop(kind, slots, candidate, relative, constants, h, out)
-        if not only_planes and kind != PLANE:
+        if compound and box:
+            mark_hidden_faces(model, k, candidate, relative)
+        # before the loop, which remembers the present faces; a refresh has no step
+        if box and constants.face_normals == 0 and h > 0.0:
+            correct_energy(slots, candidate, relative, constants, h)
+        contact_loop(slots, candidate, relative, constants, h, out)
+        if not plane:
             add_wrenches(owner, surface, frame, relative)
 
     return half_pair

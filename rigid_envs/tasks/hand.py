@@ -67,6 +67,7 @@ class Hand:
             frequency=self.SERVO_FREQUENCY,
             damping_ratio=self.SERVO_DAMPING,
             material=material,
+            name="hand",
         )
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:

@@ -107,16 +107,21 @@ class Push(Task):
         material = Material(friction=0.5, restitution=0.1)
         post = Capsule(POST_RADIUS, 0.5 * POST_HEIGHT - POST_RADIUS)
         posts = [
-            Static(post, (x, y, 0.5 * POST_HEIGHT), material=material)
-            for x, y in POSTS[: self.obstacles]
+            Static(post, (x, y, 0.5 * POST_HEIGHT), material=material, name=f"post {i}")
+            for i, (x, y) in enumerate(POSTS[: self.obstacles])
         ]
         block = Body(
-            self.block.shape, mass=MASS, position=(0, 0, self.block.height), material=material
+            self.block.shape,
+            mass=MASS,
+            position=(0, 0, self.block.height),
+            material=material,
+            name="block",
         )
+        finger = Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME, name="finger")
         return Scene(
             bodies=[block],
-            statics=[Ground(material=material), *posts],
-            drives=[Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME)],
+            statics=[Ground(material=material, name="ground"), *posts],
+            drives=[finger],
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:

@@ -118,10 +118,16 @@ class Stack(Task):
         cube = Box((HALF,) * 3)
         return Scene(
             bodies=[
-                Body(cube, mass=MASS, position=(*CELL_CENTERS[i], HALF), material=material)
+                Body(
+                    cube,
+                    mass=MASS,
+                    position=(*CELL_CENTERS[i], HALF),
+                    material=material,
+                    name=f"cube {i}",
+                )
                 for i in range(self.blocks)
             ],
-            statics=[Ground(material)],
+            statics=[Ground(material, name="ground")],
             drives=[self.hand.gripper(self.hand.max_opening, pads)],
         )
 

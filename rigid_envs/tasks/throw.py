@@ -52,9 +52,11 @@ class Throw(Task):
         """A ball between the pads of a hand above the ground."""
         material = Material(friction=0.5, restitution=0.3)
         pads = Material(friction=2.0, restitution=0.0)
-        ball = Body(Sphere(RADIUS), mass=MASS, position=self.hand.home, material=material)
+        ball = Body(
+            Sphere(RADIUS), mass=MASS, position=self.hand.home, material=material, name="ball"
+        )
         hand = self.hand.gripper(2.0 * RADIUS, pads)
-        return Scene(bodies=[ball], statics=[Ground(material)], drives=[hand])
+        return Scene(bodies=[ball], statics=[Ground(material, name="ground")], drives=[hand])
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """Hand at home with the ball; target uniform by area in a sector of a ring.

@@ -156,7 +156,7 @@ def test_contacts_tell_where_parts_touch_and_how_hard(fidelity):
 
 def test_a_stiffness_that_a_compound_cannot_have_is_refused_by_name():
     stiff = Material(stiffness=1e9)
-    with pytest.raises(ValueError, match=r"Material.stiffness 1e\+09 .* body 0 binds"):
+    with pytest.raises(ValueError, match=r"Material.stiffness 1e\+09 .* body 0 limits it"):
         World(Scene([Body(T, mass=MASS, material=stiff)], [Ground()]))
 
 

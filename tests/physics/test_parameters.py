@@ -265,7 +265,9 @@ def test_worlds_that_are_alike_share_one_model():
 
 
 def test_worlds_that_are_alike_take_no_parameters():
-    with pytest.raises(ValueError, match="build the World with per_world_parameters=True"):
+    with pytest.raises(
+        ValueError, match="needs a World that is built with per_world_parameters=True"
+    ):
         World(scenes.push_like()).set_parameters(mass=1.0)
     with pytest.raises(TypeError, match="per_world_parameters must be bool, got 1"):
         World(scenes.push_like(), per_world_parameters=1)
@@ -320,7 +322,7 @@ def test_a_range_is_held_against_the_stable_step_before_anything_runs():
     scene = scenes.block_on_ground(stiffness=1000.0)
     world = World(scene, count=2, per_world_parameters=True)
     world.check_parameters({"mass": (0.1, 5.0)})
-    message = r"mass 0\.001 kg.*Material\.stiffness 1000 .*body 0 binds.*largest safe step is"
+    message = r"mass 0\.001 kg.*Material\.stiffness 1000 .*body 0 limits it.*largest safe step is"
     with pytest.raises(ValueError, match=message):
         world.check_parameters({"mass": (0.001, 5.0)})
     with pytest.raises(ValueError, match=r"world 1.*mass 0\.001.*largest safe step"):

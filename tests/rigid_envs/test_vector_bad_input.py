@@ -154,7 +154,7 @@ def test_a_world_that_diverges_is_named_and_the_others_are_unaffected(envs):
     envs._runner.world.set_state(position=far, linear_velocity=far, worlds=broken)
     actions = random_actions(40, 4, seed=1)
     for action in actions[:2]:  # each step raises until the world is reset
-        with pytest.raises(SimulationDiverged, match="world 2: body 0 turned non-finite") as error:
+        with pytest.raises(SimulationDiverged, match="world 2: block became non-finite") as error:
             envs.step(action)
         assert error.value.worlds == [2]
         undisturbed.step(action)

@@ -235,8 +235,7 @@ def _summary(results: Sequence[Result]) -> str:
         environments.setdefault(_task_key(group[0]), []).append(group)
     for groups in environments.values():
         first = groups[0][0]
-        names = dict.fromkeys(_name(group[0]) for group in groups)
-        cells = ["<br>".join(names), _image(first), *_sizes(first.env_id)]
+        cells = [_names(first), _image(first), *_sizes(first.env_id)]
         by_algorithm = {group[0].algorithm: group for group in groups}
         for algorithm in algorithms:
             cells += _outcome(by_algorithm.get(algorithm, []))
@@ -250,10 +249,10 @@ def _task_key(one: Result) -> str:
     return f"{task} {_changes(one)}"
 
 
-def _name(one: Result) -> str:
-    plain, dense = plain_id(one.env_id), _dense_id_of(one)
-    name = plain if dense is None else f"{plain} ({dense.rpartition('/')[2]})"
-    return f"{name} {_changes(one)}".strip()
+def _names(one: Result) -> str:
+    """The registered ids of a task, sparse and dense, and the arguments that change it."""
+    ids = [name for name in (plain_id(one.env_id), dense_id(one.env_id)) if name in gym.registry]
+    return f"{'<br>'.join(ids)} {_changes(one)}".strip()
 
 
 def _changes(one: Result) -> str:

@@ -42,5 +42,5 @@ def test_what_is_read_is_a_copy():
 
 
 def test_a_solid_that_is_not_there_is_named():
-    with pytest.raises(ValueError, match=r"solid must be the index .*0 to 3 .*got 4"):
+    with pytest.raises(ValueError, match=r"solid must be the name or index .*0 to 3 .*got 4"):
         world_of().samples(4)

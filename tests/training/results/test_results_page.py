@@ -44,7 +44,7 @@ def test_pages_name_both_ids_of_a_dense_environment():
         assert "## RigidEnvs/Push-v0, PPO" in page
         assert "`RigidEnvs/PushDense-v0` is `RigidEnvs/Push-v0` with `reward_type: dense`" in page
         table = readme_text("<!-- results -->\n<!-- /results -->\n", [result])
-        assert "| RigidEnvs/Push-v0 (PushDense-v0) | PPO |" in table
+        assert "| RigidEnvs/Push-v0<br>RigidEnvs/PushDense-v0 | <img" in table
     sparse = next(result for result in results if result.algorithm == "sac")
     assert "Dense" not in page_text([sparse], SOURCE)
 

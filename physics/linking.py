@@ -1,10 +1,10 @@
 """Functions that numba compiles only into their callers.
 
-Numba compiles every function that a kernel calls into a library of its own: LLVM optimises it and
-emits machine code for it. The caller then links the result and optimises all of it again, and so
-does the caller's caller. For the deeply nested stages of a substep, that is half of the compile
-time, spent on code that never runs by itself. Here such a function is lowered to LLVM's
-representation and left at that; only the entry point is optimised and emitted.
+Numba compiles every function that a kernel calls into a library of its own, and emits machine code
+for it. The caller then links the result, inlines it and optimises it again. A stage of the substep
+never runs by itself, so its machine code is never used. Here such a function is optimised, and
+left at that; only the entry point is emitted. docs/decisions/0015-linked-functions.md has the
+compile times.
 """
 
 from typing import Any
@@ -29,17 +29,15 @@ class _Codegen:
 
 
 class _LinkedLibrary(JITCodeLibrary):
-    """Code that callers link; LLVM only inlines what must be inlined."""
+    """Optimised code that callers link, without machine code of its own.
+
+    It is optimised here, before it is inlined: only so do the loops over the lanes of one stage
+    become vector instructions.
+    """
 
     @property
     def codegen(self) -> Any:
         return _Codegen(self._codegen)
-
-    def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(
-            loop_vectorize=False, slp_vectorize=False, opt=0
-        )
-        passes.run(self._final_module, builder)
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
