@@ -20,8 +20,8 @@ from physics import (
     World,
 )
 from physics.jit import LANES
-from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
 from physics.model.contact_memory import contact_memory
+from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
 from physics.reference import scenes
 from physics.reference.scenes import BALL, GRAVITY, settled
 
