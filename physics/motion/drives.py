@@ -41,7 +41,7 @@ def make_drives(features):
                     for i in range(LANES):
                         # fraction of the substep for which the set point still moves
                         whole = left[i] > (1.0 - _SAME_STEP) * h
-                        moving = 1.0 if whole else max(left[i], 0.0) * per_h
+                        moving = 1.0 if whole else left[i] * per_h
                         ahead = reference[axis, i] + h * (moving * velocity[axis, i])
                         reference[axis, i] = ahead
                         pull = stiffness * (ahead - c[axis, i])
