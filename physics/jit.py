@@ -1,14 +1,14 @@
 """How kernels are compiled: only this file and `linking` know numba's options.
 
 There are three kinds of compiled functions:
-- a `stage` is inlined into its caller: a stage of the substep, or a formula in its loop over lanes;
+- a `stage` is inlined into its caller: a stage of the substep, or a formula in a loop over lanes;
 - a `kernel` is linked into its caller: what is called seldom, or from several places;
 - an `entry` is called from Python, releases the GIL and is cached on disk.
 
 Numba's cache notices edits of the file that defines an entry, but not of the kernels that it calls.
-So every entry captures `SOURCES`, a hash of all sources of this package, in its closure: numba
-hashes closure cells, and an edit anywhere in the package is a cache miss. (A hash that ignores
-comments would cost every process 80 ms when it starts; this one costs 2 ms.)
+So every entry mentions a local variable of its factory that is `SOURCES`, a hash of all sources of
+this package: numba hashes closure cells, and an edit anywhere in the package is a cache miss. (A
+hash that ignores comments would cost every process 80 ms when it starts; this one costs 2 ms.)
 
 The only floating-point licence is `contract` (fused multiply-add). Every world runs the same
 instructions in its own vector lane, so its result is bitwise independent of the other lanes; NaN
@@ -52,8 +52,9 @@ SOURCES: int = _hash_sources()
 # shorter loops; and independent vectors hide the latency of roots and divisions
 LANES = 16
 
-# Without reference counts (`_nrt`): numba would count all arrays of a model and a state with atomic
-# instructions. The price is that kernels can't allocate; working memory comes from Python
+# `_nrt: False` turns off reference counts: numba would count all arrays of a model and a state with
+# atomic instructions in every call. The price is that kernels can't allocate; working memory comes
+# from Python
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
 _LINKED: Any = {"pipeline_class": Linked, "no_cfunc_wrapper": True, **_OPTIONS}
 _INLINE: Any = {"forceinline": True, **_LINKED}
@@ -102,7 +103,7 @@ def _entry(function: Any, level: int) -> Any:
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
-        # An entry's arguments always have the same types and layout. Looking up the types of a
+        # An entry's arguments always have the same memory layout. Looking up the types of a
         # dozen record arrays at every call would take 3 us, a fifth of a single world's frame
         if direct:
             return direct[0](*arguments)

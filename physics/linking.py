@@ -31,8 +31,8 @@ class _Codegen:
 class _LinkedLibrary(JITCodeLibrary):
     """Optimised code that callers link, without machine code of its own.
 
-    It is optimised here, before it is inlined: only so do the loops over the lanes of one stage
-    become vector instructions.
+    It is optimised before it is inlined: afterwards LLVM would no longer turn the loops over lanes
+    of a single stage into vector instructions.
     """
 
     @property
@@ -44,6 +44,7 @@ class _LinkedLibrary(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
+        # numba asks for an address, which only emitted functions have; callers link by name
         self._ensure_finalized()
         return 0
 
@@ -61,7 +62,7 @@ class _LinkedLowering(NativeLowering):
 
 
 class Linked(CompilerBase):
-    """Numba's pipeline with that lowering: for functions that only kernels call."""
+    """Numba's default pipeline with `_LinkedLowering`: for functions that only kernels call."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The default passes, one of them replaced."""

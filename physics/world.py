@@ -98,8 +98,9 @@ class World:
 
         Raises:
             TypeError, ValueError: `time` isn't a positive finite number; a bad mask.
-            SimulationDiverged: a world became non-finite; the others have advanced.
-            ContactOverflow: more particle pairs touch than there is room for.
+            SimulationDiverged: a world became non-finite now, or did before and was neither reset
+                nor left out; the others have advanced.
+            ContactOverflow: more pairs of particles are within the skin than there is room for.
         """
         if type(time) is not float or time != self._span:  # most frames have the same length
             self._span = positive("time", time)
@@ -113,8 +114,8 @@ class World:
         if not diverged:
             full = simulation.failed("overflow")
             raise ContactOverflow(
-                f"worlds {full}: two bodies have more than eight touching pairs per "
-                "particle; they overlap deeply, or Fidelity.skin is too wide"
+                f"worlds {full}: two bodies have more than eight pairs of particles per particle "
+                "within Fidelity.skin; they overlap deeply, or the skin is too wide"
             )
         world = diverged[0]
         if self.features.per_world_parameters:
@@ -166,16 +167,18 @@ class World:
         Args:
             position: m; [chosen, bodies, 3] or what broadcasts to it, like all others.
             orientation: [chosen, bodies, 4] quaternions x y z w; they are normalised, w >= 0.
+                Angular velocities stay as they are.
             linear_velocity: m/s, [chosen, bodies, 3].
             angular_velocity: rad/s, world frame, [chosen, bodies, 3].
-            drive_position: m, [chosen, drives, 3].
+            drive_position: m, [chosen, drives, 3]; the set points move there, too, and stop.
             drive_velocity: m/s, [chosen, drives, 3].
             time: [chosen] s.
             worlds: mask [count] of the chosen worlds; all if None.
 
         Raises:
-            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero, or
-                fingers of a gripper that differ in x or z. The state is then unchanged.
+            ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero,
+                fingers of a gripper that differ in x or z, or an angular velocity in a scene
+                whose rotation isn't simulated. The state is then unchanged.
         """
         given = {
             "position": position,
@@ -330,7 +333,7 @@ class World:
 
     @property
     def time(self) -> Array:
-        """[count] s, read-only."""
+        """[count] s: a read-only view of the state; copy it to keep it."""
         return read_only(self._simulation.state.world["time"])
 
     @property
@@ -375,7 +378,10 @@ class World:
         return read_only(self._simulation.state.dynamic["reference"][:, self._simulation.bodies :])
 
     def read(self) -> Readout:
-        """All poses and velocities now, drives after the bodies: read-only."""
+        """All poses and velocities and the drives' set points now; drives after the bodies.
+
+        Read-only, and not changed by later steps.
+        """
         return self._simulation.readout()
 
     def kinetic_energy(self) -> Array:

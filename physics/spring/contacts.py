@@ -48,7 +48,8 @@ def make_half_pair_of_kind(features, kind, report):
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
-        # a plane is described in the world frame, in which the owner already is
+        # a plane is in the world frame, as the owner is: the loop reads the owner itself and adds
+        # the forces straight to it; planes are fixed and need none
         relative = owner if plane else workspace.relative[0]
         begin_half_pair(model, workspace, k, h, relative)
         if not plane:
@@ -56,7 +57,7 @@ def make_half_pair_of_kind(features, kind, report):
             relative_velocities(owner, frame, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
-        # before the loop, which remembers the present faces; a refresh has no step
+        # before the loop, which overwrites the faces of the last step; a refresh has no step
         if box and constants.face_normals == 0 and h > 0.0:
             correct_energy(slots, candidate, relative, constants, h)
         contact_loop(slots, candidate, relative, constants, h, out)
@@ -73,13 +74,13 @@ def make_begin_half_pair(features):
 
     @stage
     def begin_half_pair(model, workspace, k, h, relative):
-        """Load rate m / (W h) and inverse mean force W / F of a pair, see `hunt_crossley`.
+        """Load rate m / (W h) and inverse mean force W / F of a pair, see spring/hunt_crossley.py.
 
-        W is the weight that was in contact in the last step, over all half-pairs of the pair, and F
-        its normal force. Both results are zero where nothing was in contact. Memory is updated
-        neither by a refresh, which is a step of no length, nor in a lane that isn't advanced. All
-        of it is written to `relative`, because LLVM compares the addresses of all arrays in the
-        loop with each other before every run of the loop.
+        m is the pair mass and h the step. W is the sum of the weights of the samples that were in
+        contact in the last step, over all half-pairs of the pair, and F their normal force. Both
+        results are zero where nothing was in contact. Candidates don't remember a step of a refresh
+        (h = 0), nor of a lane that isn't advanced. All of it is written to `relative`, one array,
+        because LLVM checks before every run of the loop that its arrays don't overlap.
         """
         live, half_pair, active = (
             workspace.half_pair[k],

@@ -518,7 +518,7 @@ def test_more_particle_pairs_than_there_is_room_for_are_named_and_harm_no_other_
     alone = World(Scene(cubes, [Ground()]), fidelity)
     world.set_state(position=[(0, 0, 0.1), (0.01, 0, 0.1)], worlds=np.array([False, True, False]))
     with pytest.raises(
-        ContactOverflow, match=r"worlds \[1\]: .* eight touching pairs per particle"
+        ContactOverflow, match=r"worlds \[1\]: .* eight pairs of particles per particle"
     ):
         world.advance(0.04)
     alone.advance(0.04)
