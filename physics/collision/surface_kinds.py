@@ -25,9 +25,9 @@ def present_kinds(features):
 def by_surface_kind(features, make):
     """Stage `call(kind, ...)` that calls the function of a kind of surface.
 
-    Its source is generated, with the parameters of those functions. It must enclose the loop over
-    lanes: a branch within that loop kept it from becoming vector instructions, and made Push 2.5
-    times slower.
+    Its source is generated, with the parameters of those functions. Call it
+    well above the loop over lanes: one inlined layer directly around that loop made Push 2.5 times
+    slower.
 
     Args:
         features: of the scene.
