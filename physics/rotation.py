@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from physics.jit import kernel, stage
+from physics.jit import stage
 
 Array = np.ndarray
 
@@ -64,7 +64,7 @@ def rotate_quaternion(x, y, z, w, ax, ay, az):
     return _composed(x, y, z, w, k * ax, k * ay, k * az, c)
 
 
-@kernel
+@stage
 def rotate_quaternion_far(x, y, z, w, ax, ay, az):
     """As `rotate_quaternion`, by an angle of any size above zero."""
     s = 0.5 * math.sqrt(ax * ax + ay * ay + az * az)

@@ -1,39 +1,30 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from physics import snapshot
 from physics.analysis import diagnostics, energies, stability
 from physics.analysis.diagnostics import Contacts
+from physics.analysis.failures import failure
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
-from physics.analysis.step_limits import cause_of_divergence, check_step
-from physics.errors import ContactOverflow, SimulationDiverged
+from physics.analysis.step_limits import check_step
 from physics.model.features import Features
-from physics.model.state import State
-from physics.model.state import copy as copy_state
 from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.scene.fidelity import Fidelity, resolve
-from physics.scene.parameters import Parameters, check_ranges, check_values, with_parameters
+from physics.scene.parameters import Parameters, check_ranges, check_values
 from physics.scene.scene import Scene
 from physics.scene.validation import array, instance, integer, positive, text
+from physics.snapshot import Snapshot
 from physics.step.readout import Readout
 from physics.step.simulation import Simulation, read_only
 from physics.step.threads import check_threads
 from physics.step.write_state import write_state
 
 Array = np.ndarray
-
-
-class Snapshot(NamedTuple):
-    """The complete state of worlds, hidden contact state included, and their scene and fidelity."""
-
-    scene: Scene
-    fidelity: Fidelity
-    state: State
-    parameters: Parameters | None = None  # of worlds with per-world parameters
 
 
 class World:
@@ -78,7 +69,6 @@ class World:
             check_step(scene, self.fidelity, self._simulation.base, self.features)
         self._limits = ParameterLimits(scene, self.fidelity)
         self._solids = Solids(scene.solid_names, self._simulation.base)
-        self._span = float("nan")  # s, length of the last frame
 
     def __repr__(self) -> str:
         """Names the contents of the world."""
@@ -100,38 +90,16 @@ class World:
             TypeError, ValueError: `time` isn't a positive finite number; a bad mask.
             SimulationDiverged: a world became non-finite now, or did before and was neither reset
                 nor left out; the others have advanced.
-            ContactOverflow: more pairs of particles are within the skin than there is room for.
+            ContactOverflow: more pairs of particles are within the skin than there is room for. If
+                another world diverged in the same call, this is that error's `__cause__`.
         """
-        if type(time) is not float or time != self._span:  # most frames have the same length
-            self._span = positive("time", time)
-        if not self._simulation.advance(self._span, self._mask(worlds)):
-            self._raise_failure()
-
-    def _raise_failure(self) -> None:
-        """Raises the error of the worlds whose last steps failed."""
-        simulation, scene = self._simulation, self.scene
-        diverged = simulation.failed("diverged")
-        if not diverged:
-            full = simulation.failed("overflow")
-            raise ContactOverflow(
-                f"worlds {full}: two bodies have more than eight pairs of particles per particle "
-                "within Fidelity.skin; they overlap deeply, or the skin is too wide"
-            )
-        world = diverged[0]
-        if self.features.per_world_parameters:
-            scene = with_parameters(scene, simulation.parameters.pick([world]))
-        status, model = simulation.state.world[world], simulation.model.of_world(world)
-        cause = cause_of_divergence(
-            scene, self.fidelity, model, self.features, simulation.last_substep
-        )
-        body = int(status["diverged"]) - 1
-        name = scene.solid_names[body]
-        raise SimulationDiverged(world, body, name, float(status["time"]), cause, diverged)
+        if not self._simulation.advance(positive("time", time), self._mask(worlds)):
+            raise failure(self._simulation)
 
     def _refresh(self) -> None:
         """Computes candidates and forces of a state that was set from outside."""
         if not self._simulation.refresh():
-            self._raise_failure()
+            raise failure(self._simulation)
 
     # --- writing ------------------------------------------------------------------------------
 
@@ -234,7 +202,7 @@ class World:
         """Raises an error if the substep is too long for parameters within ranges.
 
         The ends of the ranges are checked: all bodies at one end, and each in turn at the other.
-        Values within checked ranges are not checked again by `set_parameters`.
+        Values within the last checked ranges are not checked again by `set_parameters`.
 
         Args:
             ranges: (low, high) of "mass", "friction", "restitution" or "size": numbers, or
@@ -246,7 +214,8 @@ class World:
                 the largest safe one.
         """
         low, high = check_ranges(ranges, Parameters.of(self.scene))
-        self._limits.check_range(low, high, self._allow_unstable)
+        if not self._allow_unstable:
+            self._limits.check_range(low, high)
 
     def set_parameters(
         self,
@@ -294,35 +263,18 @@ class World:
 
     def snapshot(self) -> Snapshot:
         """The complete state; worlds continue bitwise identically after `restore`."""
-        own = self.parameters if self.features.per_world_parameters else None
-        return Snapshot(self.scene, self.fidelity, copy_state(self._simulation.state), own)
+        return snapshot.save(self._simulation)
 
     def restore(self, saved: Snapshot) -> None:
-        """Returns all worlds to a snapshot of a World of the same scene, fidelity and count."""
+        """Returns all worlds to a snapshot of a World of the same scene, fidelity and count.
+
+        Raises:
+            TypeError, ValueError: not a snapshot of such a World; parameters for which the substep
+                is too long, as a World with `allow_unstable` can have. The state is then unchanged.
+        """
         instance("saved", saved, Snapshot)
-        count = len(saved.state.world)
-        if count != self.count:
-            what = f"count: {count} instead of {self.count}"
-        elif saved.fidelity != self.fidelity:
-            ours = vars(self.fidelity)
-            fields = [f"{k}={v!r}" for k, v in vars(saved.fidelity).items() if v != ours[k]]
-            what = f"fidelity: {', '.join(fields)}"
-        elif saved.scene != self.scene:
-            what = "scene"
-        elif (saved.parameters is not None) != self.features.per_world_parameters:
-            what = f"per_world_parameters: {saved.parameters is not None}"
-        else:
-            what = ""
-        if what:
-            raise ValueError(f"saved must be a snapshot of such a World; it has another {what}")
-        simulation = self._simulation
-        if saved.parameters is not None:
-            pairs = zip(simulation.parameters, saved.parameters, strict=True)
-            other = np.any([np.any(mine != theirs, axis=1) for mine, theirs in pairs], axis=0)
-            simulation.write_parameters(other, saved.parameters.pick(other))
-        for mine, theirs in zip(simulation.state, saved.state, strict=True):
-            mine[...] = theirs
-        simulation.changed()
+        limits = None if self._allow_unstable else self._limits
+        snapshot.restore(self._simulation, saved, limits)
 
     # --- reading ------------------------------------------------------------------------------
 

@@ -31,7 +31,7 @@ def measure() -> Iterator[Table]:
             warm += [run_code(FIRST_STEP, variables=cache)[0] for _ in range(-(-WARM // COLD))]
     imports = [run_code(IMPORTS)[0] for _ in range(WARM)]
     rows: list[list[Cell]] = [
-        ["cold cache", "15", statistics.median(cold), max(cold)],
+        ["cold cache", "10", statistics.median(cold), max(cold)],
         ["warm cache", "1.5", statistics.median(warm), max(warm)],
         ["imports alone", None, statistics.median(imports), max(imports)],
     ]

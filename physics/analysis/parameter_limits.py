@@ -20,19 +20,17 @@ class ParameterLimits:
         self._scene, self._fidelity = scene, fidelity
         self._safe: tuple[Parameters, Parameters] | None = None  # [1, bodies] each
 
-    def check_range(self, low: Parameters, high: Parameters, allow_unstable: bool) -> None:
+    def check_range(self, low: Parameters, high: Parameters) -> None:
         """Checks a range of parameters and stores it as the safe range.
 
         Args:
             low: [1, bodies], low ends.
             high: [1, bodies], high ends.
-            allow_unstable: store the range without a check.
 
         Raises:
             ValueError: the substep is too long for parameters in the range.
         """
-        if not allow_unstable:
-            check_range(self._scene, self._fidelity, low, high)
+        check_range(self._scene, self._fidelity, low, high)
         self._safe = low, high
 
     def check(self, new: Parameters, worlds: Any) -> None:

@@ -15,7 +15,7 @@ class Solids:
     def __init__(self, names: tuple[str, ...], model: Model) -> None:
         """`names`: of the solids; `model`: of the scene."""
         self._names, self._model = names, model
-        self._between: dict[tuple[int | str, int | str], tuple[int, int, Array]] = {}
+        self._between: dict[tuple[int, int], Array] = {}
 
     def index(self, field: str, value: int | str) -> int:
         """The index of a solid; `field` names the argument in errors.
@@ -40,15 +40,15 @@ class Solids:
         Raises:
             TypeError, ValueError: there is no such solid; the two can't touch.
         """
-        if (first, second) in self._between:
-            return self._between[first, second]
         one, other = self.index("first", first), self.index("second", second)
-        half_pairs = np.flatnonzero(between(self._model, one, other))
+        half_pairs = self._between.get((one, other))
+        if half_pairs is None:
+            half_pairs = np.flatnonzero(between(self._model, one, other))
+            self._between[one, other] = half_pairs
         if not len(half_pairs):
             raise ValueError(
                 f"first and second must be solids that can touch, got {self._names[one]!r} and "
                 f"{self._names[other]!r}: a solid and itself, two statics, or the fingers of a "
                 "gripper can't"
             )
-        self._between[first, second] = one, other, half_pairs
         return one, other, half_pairs

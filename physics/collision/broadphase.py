@@ -8,19 +8,18 @@ rotate in place: a rolling ball is listed once. Each half-pair keeps that distan
 it.
 """
 
-from functools import cache
-
 from physics.collision.candidate_list import make_clear, make_search
 from physics.collision.manifold import make_manifold_reduction
 from physics.collision.relative_frame import relative_pose
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, stage
+from physics.model.features import cached_by_features
 from physics.model.lanes import count_slots
 from physics.scene.shapes import PLANE
 
 
-@cache
+@cached_by_features
 def make_search_half_pair(features):
-    """Kernel that searches a half-pair in the lanes that need it."""
+    """Stage that searches a half-pair in the lanes that need it."""
     search = make_search(features)
     reduce_manifold = make_manifold_reduction(features, make_clear(features))
     impulse, compound = features.impulse, features.compound
@@ -34,7 +33,7 @@ def make_search_half_pair(features):
         relative_pose(workspace.solid[half_pair.owner], workspace.solid[frame], relative)
         return relative
 
-    @kernel
+    @stage
     def search_half_pair(model, state, workspace, g, k, least):
         """Searches where less of the skin is left than `least` of it, or than the last drift took.
 
@@ -88,7 +87,7 @@ def bound_motion_between(solid, other, relative_motion):
         relative_motion[i] = abs(dx) + abs(dy) + abs(dz) + rotation_bound[i] + other_bound[i]
 
 
-@cache
+@cached_by_features
 def make_broadphase(features):
     """Stage that reduces the remaining skin by the last drift and replaces lists that need it.
 
@@ -118,7 +117,7 @@ def make_broadphase(features):
     return broadphase
 
 
-@cache
+@cached_by_features
 def make_forget(features):
     """Stage that clears lists and memories in lanes whose state was set from outside."""
     clear = make_clear(features)

@@ -6,25 +6,25 @@ zeros: a weight of zero makes them no contact.
 """
 
 import math
-from functools import cache
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.collision.distances import core_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import LANES, at, kernel
+from physics.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.scene.shapes import PARTICLES, PLANE
 
 
-@cache
+@cached_by_features
 def make_clear(features):
-    """Kernel that empties a slot in one lane."""
+    """Stage that empties a slot in one lane."""
     memory_size = contact_memory(features).size
     impulse, particles = features.impulse, features.particles
 
-    @kernel
+    @stage
     def clear(row, i):
         row.weight[i] = 0.0
         for m in range(memory_size):
@@ -39,12 +39,12 @@ def make_clear(features):
     return clear
 
 
-@cache
+@cached_by_features
 def make_add_candidate(features):
-    """Kernel that writes a candidate into a slot, with the memory that its sample had before."""
+    """Stage that writes a candidate into a slot, with the memory that its sample had before."""
     memory_size, impulse = contact_memory(features).size, features.impulse
 
-    @kernel
+    @stage
     def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight):
         """`old`: the list before, `count` long; ids below `cursor` are done. Returns the cursor."""
         while cursor < count and old[cursor].sample_id < sample_id:
@@ -64,9 +64,9 @@ def make_add_candidate(features):
     return add_candidate
 
 
-@cache
+@cached_by_features
 def make_list_samples(features):
-    """Kernel that fills the list of a half-pair in one lane."""
+    """Stage that fills the list of a half-pair in one lane."""
     impulse, particles = features.impulse, features.particles
     per_world_parameters = features.per_world_parameters
     add_candidate = make_add_candidate(features)
@@ -75,7 +75,7 @@ def make_list_samples(features):
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
     )
 
-    @kernel
+    @stage
     def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):
         """Fills the list, and the manifold points of the impulse law.
 
@@ -173,13 +173,13 @@ def make_list_samples(features):
     return list_samples
 
 
-@cache
+@cached_by_features
 def make_search(features):
-    """Kernel that replaces the list of a half-pair in one lane."""
+    """Stage that replaces the list of a half-pair in one lane."""
     memory_size, impulse = contact_memory(features).size, features.impulse
     clear, list_samples = make_clear(features), make_list_samples(features)
 
-    @kernel
+    @stage
     def search(model, state, workspace, g, k, i, relative, first_point, relative_motion):
         """`relative_motion`: m, upper bound of that of the last drift; others: `list_samples`."""
         half_pair, live = model.half_pair[k], workspace.half_pair[k]

@@ -6,13 +6,13 @@ box does not leave through it, see `physics.scene.internal_faces`.
 """
 
 import math
-from functools import cache
 
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, stage
+from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated
 
 
-@cache
+@cached_by_features
 def make_compound_frames(features):
     """Stage that updates the frames of compound parts, if there are any."""
     compound = features.compound
@@ -57,7 +57,7 @@ def place_compound_parts(model, workspace):
             spin[2, i] = omega[2, i]
 
 
-@kernel
+@stage
 def mark_hidden_faces(model, k, candidate, relative):
     """Writes by how much hidden faces of a box count as farther out, for a half-pair's candidates.
 

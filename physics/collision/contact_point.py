@@ -6,11 +6,11 @@ sample's lowest point: friction then acts at the arm that a rigid body has (docs
 """
 
 import math
-from functools import cache
 
 from physics.collision.distances import box_distance, capsule_distance, sphere_distance
 from physics.jit import stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE
 
 # m: samples that come within this distance count as touching, so that a face that arrives just then
@@ -20,7 +20,7 @@ TOUCH_TOLERANCE = 1e-9
 HIDDEN = 9.0
 
 
-@cache
+@cached_by_features
 def make_touch(features, kind):
     """Formula for samples against one kind of surface."""
     plane, particles, box = kind == PLANE, kind == PARTICLES, kind == BOX

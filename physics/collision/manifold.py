@@ -7,10 +7,10 @@ until then another sample can get as deep as the skin is wide, if a body rotates
 """
 
 import math
-from functools import cache
 
-from physics.jit import at, kernel
+from physics.jit import at, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.motion.vectors import cross, rotated
 from physics.scene.shapes import PARTICLES
 
@@ -21,7 +21,7 @@ _ALIKE = 0.99
 _DEEPER, _FLAT = 0.1, 0.05
 
 
-@kernel
+@stage
 def add_manifold_point(point, surface, i, x, y, z, nx, ny, nz, separation):
     """Writes a candidate at x y z with normal nx ny nz, both in the frame of a surface."""
     R, c = surface.rotation, surface.position
@@ -37,7 +37,7 @@ def add_manifold_point(point, surface, i, x, y, z, nx, ny, nz, separation):
     point.chosen = 1
 
 
-@kernel
+@stage
 def _difference(a, b):
     """Vector from the position of a to that of b."""
     return (
@@ -47,7 +47,7 @@ def _difference(a, b):
     )
 
 
-@kernel
+@stage
 def _area(a, b, c, normal):
     """Twice the signed area of a triangle seen along a normal."""
     ux, uy, uz = _difference(a, b)
@@ -56,7 +56,7 @@ def _area(a, b, c, normal):
     return px * normal[0] + py * normal[1] + pz * normal[2]
 
 
-@kernel
+@stage
 def _farthest(manifold, n, face, x, y, z, highest):
     """Index of a face's point farthest from x y z, and the square of its distance.
 
@@ -74,7 +74,7 @@ def _farthest(manifold, n, face, x, y, z, highest):
     return best, far
 
 
-@kernel
+@stage
 def _span(manifold, n, face, deepest, skin, x, y, z):
     """Four points of a face whose mean is x y z, fewer if they lie on a line; -1 for none."""
     low = manifold[deepest].separation + _DEEPER * skin
@@ -95,7 +95,7 @@ def _span(manifold, n, face, deepest, skin, x, y, z):
     return first, second, third, fourth
 
 
-@kernel
+@stage
 def reduce_face(manifold, n, face, skin):
     """Assigns a face number to the deepest free point and those with its normal; keeps four.
 
@@ -135,12 +135,12 @@ def reduce_face(manifold, n, face, skin):
     return True
 
 
-@cache
+@cached_by_features
 def make_manifold_reduction(features, clear):
-    """Kernel that reduces the lists, just made, of a half-pair and its reverse in one lane."""
+    """Stage that reduces the lists, just made, of a half-pair and its reverse in one lane."""
     memory_size = contact_memory(features).size
 
-    @kernel
+    @stage
     def move(candidate, ids, i, source, target):
         a, b = candidate[source], candidate[target]
         ids[target, i] = ids[source, i]
@@ -150,7 +150,7 @@ def make_manifold_reduction(features, clear):
         for m in range(memory_size):
             b.memory[m, i] = a.memory[m, i]
 
-    @kernel
+    @stage
     def drop(model, state, workspace, g, k, i, manifold):
         """Removes what isn't chosen from a half-pair's list, and sets the weights of the others."""
         first, count = model.half_pair[k].first_slot, workspace.half_pair[k].count[i]
@@ -167,7 +167,7 @@ def make_manifold_reduction(features, clear):
             clear(candidate[n], i)
         workspace.half_pair[k].count[i] = kept
 
-    @kernel
+    @stage
     def reduce_manifold(model, state, workspace, g, k, i):
         half_pair = model.half_pair[k]
         if half_pair.kind == PARTICLES:

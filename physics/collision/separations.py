@@ -1,14 +1,13 @@
 """Separations between the samples of a half-pair and its surface, in one lane, for a search."""
 
-from functools import cache
-
 from physics.collision.distances import core_distance
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import at, kernel
+from physics.jit import at, stage
+from physics.model.features import cached_by_features
 from physics.scene.shapes import PARTICLES, PLANE
 
 
-@kernel
+@stage
 def separation_bound(half_pair, i, relative):
     """Lower bound in m of all separations: along the surface's axes, from the core's box.
 
@@ -29,9 +28,9 @@ def separation_bound(half_pair, i, relative):
     return max(gx, max(gy, gz)) - at(half_pair.radius, i)
 
 
-@cache
+@cached_by_features
 def make_separations(features):
-    """Kernel that writes the separation [samples] m of every sample of a half-pair."""
+    """Stage that writes the separation [samples] m of every sample of a half-pair."""
     per_world_parameters = features.per_world_parameters
 
     def make_loop(kind):
@@ -40,7 +39,7 @@ def make_separations(features):
             return None
         distance = core_distance(kind)
 
-        @kernel
+        @stage
         def loop(model, half_pair, i, relative, separation):
             R, c = relative.rotation, relative.position
             first, count = half_pair.first_sample, half_pair.sample_count
@@ -66,7 +65,7 @@ def make_separations(features):
 
     call = by_surface_kind(features, make_loop)
 
-    @kernel
+    @stage
     def separations(model, half_pair, i, relative, separation):
         call(half_pair.kind, model, half_pair, i, relative, separation)
 

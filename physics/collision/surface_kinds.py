@@ -6,7 +6,7 @@ the half-pair; which ones are compiled depends on the features.
 
 import inspect
 
-from physics.jit import stage
+from physics.jit import sequence, stage
 from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 
 
@@ -23,7 +23,7 @@ def present_kinds(features):
 
 
 def by_surface_kind(features, make):
-    """Stage `call(kind, ...)` that calls the function of a kind of surface.
+    """Sequence `call(kind, ...)` that calls the function of a kind of surface.
 
     Its source is generated, with the parameters of those functions. Call it
     well above the loop over lanes: one inlined layer directly around that loop made Push 2.5 times
@@ -48,7 +48,7 @@ def by_surface_kind(features, make):
         ]
     lines.append(f"    return {last}({parameters})")
     exec("\n".join(lines), functions)
-    return stage(functions["call"])
+    return sequence(functions["call"])
 
 
 @stage

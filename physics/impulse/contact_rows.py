@@ -4,22 +4,21 @@ The rows of all half-pairs are prepared before the sweeps, because an impulse at
 the velocities at the others. (The spring law needs a contact point only once.)
 """
 
-from functools import cache
-
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
 from physics.collision.relative_frame import relative_pose
 from physics.collision.surface_kinds import by_surface_kind
 from physics.impulse.point_impulses import effective_masses, relative_velocity
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, PLANE
 
 
-@cache
+@cached_by_features
 def make_prepare(features, kind):
-    """Kernel that writes the rows of a half-pair against one kind of surface."""
+    """Stage that writes the rows of a half-pair against one kind of surface."""
     friction, resistance = features.friction, features.resistance
     box, compound = kind == BOX, features.compound
     touch = make_touch(features, kind)
@@ -27,7 +26,7 @@ def make_prepare(features, kind):
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
     SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
 
-    @kernel
+    @stage
     def prepare(
         slots,
         candidate,
@@ -130,7 +129,7 @@ def make_prepare(features, kind):
     return prepare
 
 
-@cache
+@cached_by_features
 def make_contact_rows(features):
     """Stage that writes the contact rows of a half-pair."""
     of_kind = by_surface_kind(features, lambda kind: make_contact_rows_of_kind(features, kind))
@@ -142,7 +141,7 @@ def make_contact_rows(features):
     return contact_rows
 
 
-@cache
+@cached_by_features
 def make_contact_rows_of_kind(features, kind):
     """The same, for half-pairs whose surface is of one kind."""
     plane, box, compound = kind == PLANE, kind == BOX, features.compound

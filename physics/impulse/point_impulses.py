@@ -49,7 +49,7 @@ def operands_of(model, workspace, k):
 def rotate_inertia(model, workspace):
     """Writes the inverse inertia of all bodies in the world frame; that of other solids stays 0."""
     for m in range(model.dynamic.shape[0]):
-        if model.dynamic[m].turns:
+        if model.dynamic[m].is_body:
             R, entry = workspace.solid[m].rotation, workspace.tensor[m].entry
             j = model.dynamic[m].inverse_inertia
             for i in range(LANES):
@@ -127,6 +127,29 @@ def apply_impulse(pair, point, i, px, py, pz):
     spin[0, i] -= sx
     spin[1, i] -= sy
     spin[2, i] -= sz
+
+
+@stage
+def add_opposite(point, i, P, L, Q, M, x, y, z):
+    """Adds a vector at a point, and its moment, to P and L of the owner; subtracts both from Q and M.
+
+    The vector is an impulse in N s (P, Q: momenta) or a force in N (P, Q: forces).
+    """
+    P[0, i] += x
+    P[1, i] += y
+    P[2, i] += z
+    Q[0, i] -= x
+    Q[1, i] -= y
+    Q[2, i] -= z
+    tx, ty, tz = cross(point.arm[0, i], point.arm[1, i], point.arm[2, i], x, y, z)
+    L[0, i] += tx
+    L[1, i] += ty
+    L[2, i] += tz
+    bx, by, bz = point.surface_arm[0, i], point.surface_arm[1, i], point.surface_arm[2, i]
+    tx, ty, tz = cross(bx, by, bz, x, y, z)
+    M[0, i] -= tx
+    M[1, i] -= ty
+    M[2, i] -= tz
 
 
 @stage

@@ -18,20 +18,24 @@ The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the fac
 """
 
 import math
-from functools import cache
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
-from physics.impulse.point_impulses import apply_impulse, operands_of, relative_velocity
-from physics.jit import LANES, at, kernel, stage
+from physics.impulse.point_impulses import (
+    add_opposite,
+    apply_impulse,
+    operands_of,
+    relative_velocity,
+)
+from physics.jit import LANES, at, sequence, stage
+from physics.model.features import cached_by_features
 from physics.motion.drives import make_finger_velocity_coupling
-from physics.motion.vectors import cross
 
 # Sweeps end when none has changed a velocity by more than this fraction of the fastest approach, or
 # after so many
 TOLERANCE, MAX_SWEEPS = 1e-6, 64
 
 
-@kernel
+@stage
 def find_impacts(pair, constants, h, lane):
     """Notes the restitution of each colliding point, -1 of others, and which lanes have any."""
     points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
@@ -55,7 +59,7 @@ def find_impacts(pair, constants, h, lane):
             largest[i] = max(largest[i], e) if collides else largest[i]
 
 
-@kernel
+@stage
 def remove_push_out(pair, colliding):
     """Removes, in lanes with a collision, the velocity that pushed overlapping bodies apart."""
     points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
@@ -73,12 +77,12 @@ def remove_push_out(pair, colliding):
             apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
 
 
-@cache
+@cached_by_features
 def make_impact_sweep(features):
-    """Kernel of one sweep over the points of a half-pair."""
+    """Stage of one sweep over the points of a half-pair."""
     friction = features.friction
 
-    @kernel
+    @stage
     def impact_sweep(pair, mu, lane, after):
         """Adds the work of all impulses to `lane.impact_work`.
 
@@ -131,7 +135,7 @@ def make_impact_sweep(features):
     return impact_sweep
 
 
-@kernel
+@stage
 def apply_restitution(pair, lane, rescale):
     """Applies e times what compression gave; `rescale`: removes all but a fraction of it again."""
     points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
@@ -161,7 +165,7 @@ def apply_impacts(model, workspace, refresh):
         for n in range(points.shape[0]):
             point = points[n]
             normal, tangential = point.normal, point.tangential_impact
-            arm, surface_arm, extra = point.arm, point.surface_arm, point.extra_impulse
+            extra = point.extra_impulse
             for i in range(LANES):
                 size = point.normal_impact[i]
                 px = size * normal[0, i] + tangential[0, i]
@@ -172,30 +176,16 @@ def apply_impacts(model, workspace, refresh):
                     extra[1, i] += py
                     extra[2, i] += pz
                     continue
-                P[0, i] += px
-                P[1, i] += py
-                P[2, i] += pz
-                Q[0, i] -= px
-                Q[1, i] -= py
-                Q[2, i] -= pz
-                tx, ty, tz = cross(arm[0, i], arm[1, i], arm[2, i], px, py, pz)
-                L[0, i] += tx
-                L[1, i] += ty
-                L[2, i] += tz
-                bx, by, bz = surface_arm[0, i], surface_arm[1, i], surface_arm[2, i]
-                tx, ty, tz = cross(bx, by, bz, px, py, pz)
-                M[0, i] -= tx
-                M[1, i] -= ty
-                M[2, i] -= tz
+                add_opposite(point, i, P, L, Q, M, px, py, pz)
 
 
-@cache
+@cached_by_features
 def make_impacts(features):
     """Stage that lets contacts collide, in the worlds in which any do."""
     impact_sweep = make_impact_sweep(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
 
-    @kernel
+    @stage
     def solve_impacts(model, workspace, after):
         """Sweeps over all contacts until they converge; converged lanes don't change any more."""
         lane = workspace.lane[0]
@@ -218,14 +208,14 @@ def make_impacts(features):
             if left == 0:
                 break
 
-    @kernel
+    @stage
     def restitute(model, workspace, rescale):
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
                 apply_restitution(operands_of(model, workspace, k), workspace.lane[0], rescale)
         couple_finger_velocities(model, workspace)
 
-    @kernel
+    @stage
     def collide(model, workspace, refresh):
         lane = workspace.lane[0]
         work, allowed_work, scale = lane.impact_work, lane.allowed_work, lane.restitution_scale
@@ -244,7 +234,7 @@ def make_impacts(features):
         solve_impacts(model, workspace, True)
         apply_impacts(model, workspace, refresh)
 
-    @kernel
+    @stage
     def find_all_impacts(model, workspace, h):
         """Number of lanes with a collision."""
         lane, lanes = workspace.lane[0], 0
@@ -259,7 +249,7 @@ def make_impacts(features):
             lanes += lane.colliding[i]
         return lanes
 
-    @stage
+    @sequence
     def impacts(model, workspace, h, refresh):
         if find_all_impacts(model, workspace, h) == 0:
             return

@@ -13,10 +13,9 @@ surface, a substep
    are apart and the soft contact of `sweep.py` for those that overlap.
 """
 
-from functools import cache
-
 from physics.impulse.contact_rows import make_contact_rows
 from physics.impulse.point_impulses import (
+    add_opposite,
     apply_angular_impulse,
     apply_impulse,
     operands_of,
@@ -24,19 +23,20 @@ from physics.impulse.point_impulses import (
 )
 from physics.impulse.restitution import make_impacts
 from physics.impulse.sweep import make_sweep
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, sequence, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.model.lanes import record_contacts
 from physics.motion.drives import make_finger_velocity_coupling
-from physics.motion.vectors import cross, rotated_back, tensor_times
+from physics.motion.vectors import rotated_back, tensor_times
 
 
-@cache
+@cached_by_features
 def make_warm_start(features):
-    """Kernel that applies the impulses of the last substep again, and notes what relaxing gave."""
+    """Stage that applies the impulses of the last substep again, and notes what relaxing gave."""
     friction, resistance = features.friction, features.resistance
 
-    @kernel
+    @stage
     def warm_start(pair):
         points = pair.points
         for n in range(points.shape[0]):
@@ -72,15 +72,15 @@ def remember(memory, first, i, updates, x, y, z):
     memory[first + 2, i] = z if updates else memory[first + 2, i]
 
 
-@cache
+@cached_by_features
 def make_store_forces(features):
-    """Kernel that adds the forces of a half-pair's points, and stores what contacts remember."""
+    """Stage that adds the forces of a half-pair's points, and stores what contacts remember."""
     friction, resistance = features.friction, features.resistance
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
     SHEAR, TWIST = memory_rows.shear, memory_rows.twist
 
-    @kernel
+    @stage
     def store_forces(pair, candidate, updates_memory, h, normal_force_sum):
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
         Q, per_h = surface.rotation, 1.0 / h
@@ -88,7 +88,7 @@ def make_store_forces(features):
         for n in range(points.shape[0]):
             point, row = points[n], candidate[n]
             memory, impact_force = row.memory, row.impact_force
-            normal, arm, surface_arm = point.normal, point.arm, point.surface_arm
+            normal = point.normal
             tangential, tangential_impact = point.tangential_impulse, point.tangential_impact
             extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
             for i in range(LANES):
@@ -130,24 +130,8 @@ def make_store_forces(features):
                     U[0, i] -= tx
                     U[1, i] -= ty
                     U[2, i] -= tz
-                fx *= per_h
-                fy *= per_h
-                fz *= per_h
-                F[0, i] += fx
-                F[1, i] += fy
-                F[2, i] += fz
-                G[0, i] -= fx
-                G[1, i] -= fy
-                G[2, i] -= fz
-                tx, ty, tz = cross(arm[0, i], arm[1, i], arm[2, i], fx, fy, fz)
-                T[0, i] += tx
-                T[1, i] += ty
-                T[2, i] += tz
-                bx, by, bz = surface_arm[0, i], surface_arm[1, i], surface_arm[2, i]
-                tx, ty, tz = cross(bx, by, bz, fx, fy, fz)
-                U[0, i] -= tx
-                U[1, i] -= ty
-                U[2, i] -= tz
+                fx, fy, fz = per_h * fx, per_h * fy, per_h * fz
+                add_opposite(point, i, F, T, G, U, fx, fy, fz)
 
     return store_forces
 
@@ -170,7 +154,7 @@ def apply_known_forces(model, workspace, h):
             omega[2, i] += h * tz
 
 
-@cache
+@cached_by_features
 def make_impulses(features):
     """Stage that adds the contact forces of all half-pairs, and records contacts."""
     contact_rows, impacts = make_contact_rows(features), make_impacts(features)
@@ -178,14 +162,14 @@ def make_impulses(features):
     store_forces = make_store_forces(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
 
-    @kernel
+    @stage
     def sweep_all(model, workspace, h, soft):
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
                 sweep(operands_of(model, workspace, k), model.half_pair[k], h, soft)
                 couple_finger_velocities(model, workspace)
 
-    @kernel
+    @stage
     def finish(model, state, workspace, g, k, h, elapsed):
         pair, first = operands_of(model, workspace, k), model.half_pair[k].first_slot
         candidate = state.candidate[g, first : first + pair.points.shape[0]]
@@ -195,7 +179,7 @@ def make_impulses(features):
         store_forces(pair, candidate, workspace.lane[0].updates_memory, h, normal_force)
         record_contacts(model, state, workspace, g, k, normal_force, elapsed)
 
-    @kernel
+    @sequence
     def impulses(model, state, workspace, g, h, drifted, elapsed):
         half_pairs, candidates = model.half_pair.shape[0], 0
         for k in range(half_pairs):

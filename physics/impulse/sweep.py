@@ -16,10 +16,10 @@ law for the relative angular velocity.
 """
 
 import math
-from functools import cache
 
 from physics.impulse.point_impulses import apply_angular_impulse, apply_impulse, relative_velocity
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, stage
+from physics.model.features import cached_by_features
 
 # m/s, largest speed at which overlapping bodies are pushed apart
 MAX_PUSH_OUT_SPEED = 1.0
@@ -56,12 +56,12 @@ def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
     apply_angular_impulse(pair, i, qx - px, qy - py, qz - pz)
 
 
-@cache
+@cached_by_features
 def make_sweep(features):
-    """Kernel that corrects the impulses of a half-pair's points, one after another."""
+    """Stage that corrects the impulses of a half-pair's points, one after another."""
     friction, resistance = features.friction, features.resistance
 
-    @kernel
+    @stage
     def sweep(pair, constants, h, soft):
         """`soft`: with the bias that pushes overlapping bodies apart, by soft contacts."""
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]

@@ -105,7 +105,7 @@ def write_per_world(model: Model, layout: Layout, worlds: Array, p: Parameters) 
 def _dynamic_rows(scene: Scene) -> Array:
     """Rows of DYNAMIC: the columns that don't depend on parameters."""
     rows = np.zeros(len(scene.bodies) + len(scene.driven_bodies), dtype=DYNAMIC)
-    rows["turns"][: len(scene.bodies)] = 1
+    rows["is_body"][: len(scene.bodies)] = 1
     rows["gripper_partner"] = -1
     for row, drive in zip(rows[len(scene.bodies) :], scene.driven_bodies, strict=True):
         row["servo_stiffness"] = drive.mass * drive.frequency**2

@@ -5,10 +5,9 @@ exist depends on the features of the scene; `ContactMemory` gives the first row 
 Kernels that copy or clear a memory treat it as a block and need not know what is in it.
 """
 
-from functools import cache
 from typing import NamedTuple
 
-from physics.model.features import Features
+from physics.model.features import Features, cached_by_features
 
 
 class ContactMemory(NamedTuple):
@@ -36,7 +35,7 @@ class ContactMemory(NamedTuple):
     face: int = -1
 
 
-@cache
+@cached_by_features
 def contact_memory(features: Features) -> ContactMemory:
     """The memory that contacts of a scene with these features have."""
     coulomb = features.friction and not features.viscous

@@ -1,10 +1,13 @@
 """Features: compile-time switches that the engine derives from a scene and a fidelity.
 
 Counts, sizes and material values are not features. Scenes that differ only in these share their
-kernels, so a parameter sweep compiles nothing.
+kernels, so a parameter sweep compiles nothing. Scenes whose features differ share the stages that
+don't depend on the difference, within a process.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NamedTuple
 
 # rotation of bodies: none; with equal principal moments of inertia; general
 NO_ROTATION, ISOTROPIC, GENERAL = range(3)
@@ -42,3 +45,41 @@ class Features(NamedTuple):
     gripper: bool
     compound: bool
     per_world_parameters: bool
+
+
+class _Reader:
+    """Features that note which of them are read."""
+
+    def __init__(self, features: Features) -> None:
+        self.features = features
+        self.read: dict[str, Any] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        value = self.read[name] = getattr(self.features, name)
+        return value
+
+
+def cached_by_features(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Caches make(features, *others) by `others` and by those features that it reads.
+
+    What `make` reads through the functions that it calls counts as well. Scenes whose features
+    differ elsewhere get the same stage, and numba compiles it once for all of them. Not for an
+    entry: it is called without a look at the types of its arguments, which depend on all features.
+    """
+    made: dict[tuple[Any, ...], list[tuple[dict[str, Any], Any]]] = {}
+
+    @wraps(make)
+    def cached(features: Any, *others: Any) -> Any:
+        caller = features if isinstance(features, _Reader) else _Reader(features)
+        actual, known = caller.features, made.setdefault(others, [])
+        for read, stage in known:
+            if all(getattr(actual, name) == value for name, value in read.items()):
+                caller.read.update(read)
+                return stage
+        reader = _Reader(actual)
+        stage = make(reader, *others)
+        known.append((reader.read, stage))
+        caller.read.update(reader.read)
+        return stage
+
+    return cached

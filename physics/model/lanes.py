@@ -6,19 +6,17 @@ loops over the lanes without a branch, so LLVM turns the loop into vector instru
 mix: a world's result does not depend on the worlds in the other lanes.
 """
 
-from functools import cache
-
 import numpy as np
 
-from physics.jit import LANES, kernel, stage
-from physics.model.features import Features
+from physics.jit import LANES, stage
+from physics.model.features import Features, cached_by_features
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE
 from physics.model.tables import Model
 
 Array = np.ndarray
 
 
-@cache
+@cached_by_features
 def make_constants(features: Features):
     """Stage that returns the model of lane group g: one row per dynamic body and half-pair."""
     per_world_parameters = features.per_world_parameters
@@ -39,7 +37,7 @@ def make_constants(features: Features):
     return constants
 
 
-@kernel
+@stage
 def load_forces(state, workspace, g, m, i):
     """Loads force and torque of dynamic body m into lane i."""
     row, solid = state.dynamic[g * LANES + i, m], workspace.solid[m]
@@ -142,7 +140,7 @@ def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
         record_first_contact(model, state, workspace, g, k, normal_force, elapsed)
 
 
-@kernel
+@stage
 def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
     """Records time and place of the first contact of a half-pair, in the lanes that have it now."""
     first, updates_memory = workspace.half_pair[k].first_touch, workspace.lane[0].updates_memory
@@ -167,7 +165,7 @@ def end_refresh(model, state, workspace, g):
                 load_forces(state, workspace, g, m, i)
 
 
-@kernel
+@stage
 def store(model, state, workspace, g, i, time):
     """Stores lane i into its world, at `time` s; quaternions with w >= 0."""
     w = g * LANES + i

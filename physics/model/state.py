@@ -1,13 +1,12 @@
 """State: what changes, as arrays with a leading world axis."""
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from physics.jit import LANES, aligned_zeros, columns
 from physics.model.contact_memory import contact_memory
-from physics.model.features import Features
+from physics.model.features import Features, cached_by_features
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -56,7 +55,7 @@ STATUS = np.dtype(
 )
 
 
-@cache
+@cached_by_features
 def candidate_dtype(features: Features) -> np.dtype:
     """One row per slot: a candidate in each lane of a group, zeros where there is none."""
     fields = [

@@ -21,7 +21,7 @@ Array = np.ndarray
 # one row per dynamic body. A drive never rotates: its inertia is infinite
 DYNAMIC = np.dtype(
     [
-        ("turns", "i8"),  # 1 for a body, 0 for a drive
+        ("is_body", "i8"),  # 1 for a body, 0 for a drive
         ("core_reach", "f8"),  # m, largest distance from the centre of a point that rotation moves
         ("inverse_mass", "f8"),  # 1/kg
         ("inertia", "f8", (3,)),  # kg m^2, principal moments; infinite for drives

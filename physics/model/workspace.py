@@ -3,14 +3,13 @@
 Vectors stand as [3, LANES], so that loops over lanes read and write consecutive numbers.
 """
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from physics.jit import LANES, aligned_zeros
 from physics.model.contact_memory import contact_memory
-from physics.model.features import Features
+from physics.model.features import Features, cached_by_features
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -39,7 +38,7 @@ SOLID = np.dtype(
         ("current_weight", "f8", (LANES,)),  # of the samples in contact
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
-        ("updates_memory", "f8", (LANES,)),  # 1 where contacts remember this step
+        ("remembers", "f8", (LANES,)),  # 1 where contacts remember this step
     ],
     align=True,
 )
@@ -123,7 +122,7 @@ LANE = np.dtype(
 )
 
 
-@cache
+@cached_by_features
 def remembered_dtype(features: Features) -> np.dtype:
     """One row per candidate of a list that is being replaced."""
     size = contact_memory(features).size

@@ -7,9 +7,8 @@ once both are saturated. Along x and z the fingers move as one solid: forces on 
 half each.
 """
 
-from functools import cache
-
 from physics.jit import LANES, stage
+from physics.model.features import cached_by_features
 
 CLOSING = 1  # axis along which grippers close
 
@@ -18,7 +17,7 @@ CLOSING = 1  # axis along which grippers close
 _SAME_STEP = 1e-9
 
 
-@cache
+@cached_by_features
 def make_drives(features):
     """Stage that moves the set points and adds the servo forces."""
     present, gripper = features.drives, features.gripper
@@ -27,7 +26,7 @@ def make_drives(features):
     def drives(model, workspace, h):
         if present:
             for m in range(model.dynamic.shape[0]):
-                if model.dynamic[m].turns:
+                if model.dynamic[m].is_body:
                     continue
                 solid, constants = workspace.solid[m], model.dynamic[m]
                 stiffness, damping = constants.servo_stiffness, constants.servo_damping
@@ -78,7 +77,7 @@ def average(values, others):
                 others[axis, i] = mean
 
 
-@cache
+@cached_by_features
 def make_finger_coupling(features):
     """Stage that makes one solid of a gripper's fingers: forces, and momenta after collisions."""
     gripper = features.gripper
@@ -97,7 +96,7 @@ def make_finger_coupling(features):
     return couple_fingers
 
 
-@cache
+@cached_by_features
 def make_finger_velocity_coupling(features):
     """Stage that makes one solid of a gripper's fingers while impulses change their velocities."""
     gripper = features.gripper

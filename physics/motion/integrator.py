@@ -11,10 +11,9 @@ slimmest axis. Such a rotation is made in parts, each within SMALL_ROTATION up t
 """
 
 import math
-from functools import cache
 
 from physics.jit import LANES, at, stage
-from physics.model.features import GENERAL, NO_ROTATION
+from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
 from physics.motion.kinematics import angular_velocity_of
 from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far
 
@@ -22,7 +21,7 @@ from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternio
 MOST_PARTS = 100.0
 
 
-@cache
+@cached_by_features
 def make_kick(features):
     """Stage that adds the impulses of the present force and torque over a time."""
     rotation = features.rotation
@@ -37,7 +36,7 @@ def make_kick(features):
                 P[0, i] += time * force[0, i]
                 P[1, i] += time * force[1, i]
                 P[2, i] += time * force[2, i]
-            if rotation != NO_ROTATION and model.dynamic[m].turns:
+            if rotation != NO_ROTATION and model.dynamic[m].is_body:
                 for i in range(LANES):
                     L[0, i] += time * torque[0, i]
                     L[1, i] += time * torque[1, i]
@@ -46,7 +45,7 @@ def make_kick(features):
     return kick
 
 
-@cache
+@cached_by_features
 def make_midpoint_rotation(features, rotate_quaternion):
     """Formula of the midpoint rule: returns the new quaternion and the omega it used."""
     rotation = features.rotation
@@ -73,7 +72,7 @@ def small_rotation_limit(jx, jy, jz, time):
     return SMALL_ROTATION * SMALL_ROTATION / (most * most)
 
 
-@cache
+@cached_by_features
 def make_drift(features):
     """Stage that moves and rotates every dynamic body for a time, and bounds how far it moved."""
     rotation = features.rotation
@@ -97,7 +96,7 @@ def make_drift(features):
                 displacement[0, i] = dx
                 displacement[1, i] = dy
                 displacement[2, i] = dz
-            if rotation == NO_ROTATION or not constants.turns:
+            if rotation == NO_ROTATION or not constants.is_body:
                 continue
             far = 0
             for i in range(LANES):

@@ -1,9 +1,7 @@
 """Frames of all solids: rotation matrix, velocity and angular velocity from the state."""
 
-from functools import cache
-
 from physics.jit import LANES, at, stage
-from physics.model.features import GENERAL, NO_ROTATION
+from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
 from physics.rotation import rotation_entries
 
 
@@ -47,7 +45,7 @@ def write_static_frames(model, workspace):
 def write_drive_frames(model, workspace):
     """Writes what never changes of the drives, once for all steps: they never rotate."""
     for m in range(model.dynamic.shape[0]):
-        if not model.dynamic[m].turns:
+        if not model.dynamic[m].is_body:
             solid = workspace.solid[m]
             for i in range(LANES):
                 for c in range(3):
@@ -69,7 +67,7 @@ def angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
     )
 
 
-@cache
+@cached_by_features
 def make_kinematics(features):
     """Stage that updates the frames of the dynamic bodies from their state."""
     rotation = features.rotation
@@ -85,7 +83,7 @@ def make_kinematics(features):
                 v[0, i] = at(inverse_mass, i) * P[0, i]
                 v[1, i] = at(inverse_mass, i) * P[1, i]
                 v[2, i] = at(inverse_mass, i) * P[2, i]
-            if not constants.turns:  # see write_drive_frames
+            if not constants.is_body:  # see write_drive_frames
                 continue
             for i in range(LANES):
                 write_rotation(solid, i)

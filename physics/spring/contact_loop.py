@@ -4,13 +4,12 @@ Everything is computed in the frame of the surface, where the surface is at rest
 candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vectorise it.
 """
 
-from functools import cache
-
 import numpy as np
 
 from physics.collision.contact_point import HIDDEN, make_touch
-from physics.jit import LANES, at, kernel
+from physics.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, PLANE
 from physics.spring.coulomb import friction_force, twist_torque, viscous_force
 from physics.spring.energy_correction import rotational_inverse_mass
@@ -29,7 +28,7 @@ REPORT = np.dtype(
 )
 
 
-@cache
+@cached_by_features
 def make_contact_loop(features, kind, report):
     """Loop over the slots of a half-pair; with `report` it also writes a row for each candidate."""
     viscous, resistance = features.viscous, features.resistance
@@ -45,7 +44,7 @@ def make_contact_loop(features, kind, report):
     )
     SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
 
-    @kernel
+    @stage
     def contact_loop(slots, candidate, relative, constants, h, rows):
         R, c = relative.rotation, relative.position
         v, omega = relative.velocity, relative.angular_velocity
@@ -55,7 +54,7 @@ def make_contact_loop(features, kind, report):
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
-        current_weight, remembers = relative.current_weight, relative.updates_memory
+        current_weight, remembers = relative.current_weight, relative.remembers
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals = constants.face_normals != 0
         rolling, spinning = constants.rolling, constants.spinning

@@ -4,12 +4,11 @@ Both solids feel opposite forces at the contact point, so momentum and angular m
 conserved.
 """
 
-from functools import cache
-
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.relative_frame import relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, sequence, stage
+from physics.model.features import cached_by_features
 from physics.model.lanes import record_contacts
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, PLANE
@@ -20,19 +19,22 @@ from physics.spring.energy_correction import make_energy_correction
 _LEAST_FORCE = 1e-200
 
 
-@cache
+@cached_by_features
 def make_half_pair(features, report):
-    """Stage that computes the forces of one half-pair, and adds its wrenches to both solids."""
+    """Sequence that computes the forces of one half-pair, and adds its wrenches to both solids.
+
+    `rows`: [slots] of REPORT, written if `report`; else ().
+    """
     of_kind = by_surface_kind(features, lambda kind: make_half_pair_of_kind(features, kind, report))
 
-    @stage
+    @sequence
     def half_pair(model, state, workspace, rows, g, k, h):
         of_kind(model.half_pair[k].kind, model, state, workspace, rows, g, k, h)
 
     return half_pair
 
 
-@cache
+@cached_by_features
 def make_half_pair_of_kind(features, kind, report):
     """The same, for half-pairs whose surface is of one kind."""
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
@@ -40,7 +42,7 @@ def make_half_pair_of_kind(features, kind, report):
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
 
-    @stage
+    @sequence
     def half_pair(model, state, workspace, rows, g, k, h):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
@@ -67,7 +69,7 @@ def make_half_pair_of_kind(features, kind, report):
     return half_pair
 
 
-@cache
+@cached_by_features
 def make_begin_half_pair(features):
     """Stage that prepares the sums of a half-pair, and what its loop reads of the last step."""
     compound = features.compound
@@ -103,14 +105,14 @@ def make_begin_half_pair(features):
                 )
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
             relative.inverse_mean_force[i] = weight / force if force > _LEAST_FORCE else 0.0
-            relative.updates_memory[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
+            relative.remembers[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
             relative.normal_force_sum[i] = 0.0
 
     return begin_half_pair
 
 
-@kernel
+@stage
 def sum_of_pair(model, workspace, k, weight, force):
     """Sums W and F of the last step over all half-pairs of a pair; compounds have several."""
     for i in range(LANES):
@@ -149,12 +151,15 @@ def add_wrenches(owner, surface, frame, relative):
         U[2, i] -= tz + dx * fy - dy * fx
 
 
-@cache
+@cached_by_features
 def make_contacts(features):
-    """Stage that adds the contact forces of all half-pairs, and records contacts."""
+    """Sequence that adds the contact forces of all half-pairs, and records contacts.
+
+    It takes the arguments of the impulse law, which alone needs `drifted`.
+    """
     half_pair = make_half_pair(features, False)
 
-    @stage
+    @sequence
     def contacts(model, state, workspace, g, h, drifted, elapsed):
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]

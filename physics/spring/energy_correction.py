@@ -18,11 +18,11 @@ The force acts at the ball's centre, and reports of contacts don't include it.
 """
 
 import math
-from functools import cache
 
 from physics.collision.distances import box_distance
-from physics.jit import LANES, at, kernel, stage
+from physics.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
+from physics.model.features import cached_by_features
 
 # half steps of motion within which the centre is near the core; elsewhere nothing changes
 _NEAR = 8.0
@@ -42,12 +42,12 @@ def _square(penetration):
     return d * d
 
 
-@cache
+@cached_by_features
 def make_energy_correction(features):
-    """Kernel for the slots of a half-pair of balls or capsules against a box."""
+    """Stage for the slots of a half-pair of balls or capsules against a box."""
     compound, remembered_face = features.compound, contact_memory(features).face
 
-    @kernel
+    @stage
     def correct_energy(slots, candidate, relative, constants, h):
         R, c = relative.rotation, relative.position
         v, omega = relative.velocity, relative.angular_velocity

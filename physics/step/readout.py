@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.jit import LANES, SOURCES, at, entry, kernel
-from physics.model.features import GENERAL, NO_ROTATION, Features
+from physics.jit import LANES, SOURCES, at, entry, stage
+from physics.model.features import GENERAL, NO_ROTATION, Features, cached_by_features
 from physics.model.lanes import make_constants
 from physics.motion.kinematics import angular_velocity_of
 
@@ -59,12 +59,12 @@ class Readout(NamedTuple):
         return self.rows[..., 13:16]
 
 
-@cache
+@cached_by_features
 def make_write_rows(features: Features):
-    """Kernel that writes the rows of one world."""
+    """Stage that writes the rows of one world."""
     rotation = features.rotation
 
-    @kernel
+    @stage
     def write_rows(model, state, w, table):
         """`model`: of the world's group."""
         lane = w % LANES
@@ -86,7 +86,7 @@ def make_write_rows(features: Features):
             ox = 0.0
             oy = 0.0
             oz = 0.0
-            if rotation != NO_ROTATION and constants.turns:
+            if rotation != NO_ROTATION and constants.is_body:
                 L, j = m.angular_momentum, constants.inverse_inertia
                 jx, jy, jz = at(j[0], lane), at(j[1], lane), at(j[2], lane)
                 if rotation == GENERAL:

@@ -1,12 +1,10 @@
 """A substep, stage by stage. This file computes nothing: it lists what happens, in order."""
 
-from functools import cache
-
 from physics.collision.broadphase import make_broadphase
 from physics.collision.compound_frames import make_compound_frames
 from physics.impulse.solver import make_impulses
-from physics.jit import stage
-from physics.model.features import Features
+from physics.jit import sequence
+from physics.model.features import Features, cached_by_features
 from physics.model.lanes import end_refresh
 from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.gravity import gravity
@@ -15,9 +13,9 @@ from physics.motion.kinematics import make_kinematics
 from physics.spring.contacts import make_contacts
 
 
-@cache
+@cached_by_features
 def make_forces(features: Features):
-    """Stage that computes the forces at the present positions.
+    """Sequence that computes the forces at the present positions.
 
     Velocities are those of the last drift, which took `drifted` s, so they lag positions by half of
     it.
@@ -26,7 +24,7 @@ def make_forces(features: Features):
     couple_fingers = make_finger_coupling(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
-    @stage
+    @sequence
     def forces(model, state, workspace, g, h, drifted, elapsed):
         gravity(model, workspace)
         drives(model, workspace, drifted)
@@ -36,9 +34,9 @@ def make_forces(features: Features):
     return forces
 
 
-@cache
+@cached_by_features
 def make_substep(features: Features):
-    """Stage of one substep for the worlds of lane group g."""
+    """Sequence of one substep for the worlds of lane group g."""
     kick = make_kick(features)
     drift = make_drift(features)
     kinematics = make_kinematics(features)
@@ -49,7 +47,7 @@ def make_substep(features: Features):
     # of the half kick that comes first
     refresh_span = 0.5 if features.impulse else 0.0
 
-    @stage
+    @sequence
     def substep(model, state, workspace, g, h, elapsed, starts_collision_step, refresh):
         """`refresh`: only computes the forces of states that were set from outside."""
         if not refresh:

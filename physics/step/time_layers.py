@@ -9,8 +9,8 @@ import math
 from functools import cache
 
 from physics.collision.broadphase import make_forget
-from physics.jit import LANES, SOURCES, kernel, large_entry, stage
-from physics.model.features import Features
+from physics.jit import LANES, SOURCES, large_entry, stage
+from physics.model.features import Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames
 from physics.step.readout import make_write_rows
@@ -25,7 +25,7 @@ def substep_count(span: float, longest: float) -> int:
     return max(1, math.ceil(span / longest * (1.0 - 1e-12)))
 
 
-@kernel
+@stage
 def first_diverged(model, workspace, i):
     """Index plus 1 of the first dynamic body in lane i that isn't finite; 0 if all are.
 
@@ -42,7 +42,7 @@ def first_diverged(model, workspace, i):
     return 0
 
 
-@cache
+@cached_by_features
 def make_write_back(features: Features):
     """Stage that stores lanes into their worlds: diverged ones at once, all after the frame."""
     write_rows = make_write_rows(features)

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from physics.jit import SOURCES, entry, kernel
+from physics.jit import SOURCES, entry, stage
 
 Array = np.ndarray
 
 
-@kernel
+@stage
 def _goal_distance(a, b, i):
     """Distance between the goals a[:, i] and b[:, i]."""
     largest, n = 0.0, a.shape[0]

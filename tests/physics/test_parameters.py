@@ -328,7 +328,11 @@ def test_a_range_is_held_against_the_stable_step_before_anything_runs():
     with pytest.raises(ValueError, match=r"world 1.*mass 0\.001.*largest safe step"):
         world.set_parameters(mass=[[0.1], [0.001]])
     np.testing.assert_array_equal(world.parameters.mass, [[0.1], [0.1]])
-    World(scene, per_world_parameters=True, allow_unstable=True).set_parameters(mass=0.001)
+    unstable = World(scene, count=2, per_world_parameters=True, allow_unstable=True)
+    unstable.set_parameters(mass=0.001)
+    with pytest.raises(ValueError, match=r"mass 0\.001.*largest safe step"):
+        world.restore(unstable.snapshot())
+    np.testing.assert_array_equal(world.parameters.mass, [[0.1], [0.1]])
 
 
 def test_without_a_stiffness_any_mass_is_stable_and_the_smallest_size_may_sink():

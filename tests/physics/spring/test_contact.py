@@ -15,6 +15,7 @@ from physics import (
     Ground,
     Material,
     Scene,
+    SimulationDiverged,
     Sphere,
     Static,
     World,
@@ -526,6 +527,18 @@ def test_more_particle_pairs_than_there_is_room_for_are_named_and_harm_no_other_
     world.reset(np.array([False, True, False]))
     world.advance(0.04)
     np.testing.assert_array_equal(world.position[1], alone.position[0])
+
+
+def test_an_overflow_is_reported_although_another_world_diverges():
+    cubes = [Body(CUBE, mass=0.1, position=(x, 0, 0.1)) for x in (0.0, 0.1)]
+    fidelity = Fidelity(geometry="particle", spacing=0.25, skin=1.0)
+    world = World(Scene(cubes, [Ground()]), fidelity, count=3)
+    world.set_state(position=[(0, 0, 0.1), (0.01, 0, 0.1)], worlds=np.array([False, True, False]))
+    world.set_state(linear_velocity=1e60, worlds=np.array([False, False, True]))
+    with pytest.raises(SimulationDiverged, match="world 2") as caught:
+        world.advance(0.04)
+    assert isinstance(caught.value.__cause__, ContactOverflow)
+    assert "worlds [1]" in str(caught.value.__cause__)
 
 
 def test_cubes_of_particles_rest_on_the_ground():

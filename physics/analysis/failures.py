@@ -1,0 +1,36 @@
+"""The error of worlds whose last steps failed."""
+
+from physics.analysis.step_limits import cause_of_divergence
+from physics.errors import ContactOverflow, SimulationDiverged
+from physics.scene.parameters import with_parameters
+from physics.step.simulation import Simulation
+
+
+def failure(simulation: Simulation) -> Exception:
+    """The error to raise after a call in which worlds diverged or ran out of room for contacts.
+
+    If both happened, the overflow is the cause of the other error (`__cause__`): the next call
+    clears it.
+    """
+    full, diverged = simulation.failed("overflow"), simulation.failed("diverged")
+    overflow = ContactOverflow(
+        f"worlds {full}: two bodies have more than eight pairs of particles per particle within "
+        "Fidelity.skin; they overlap deeply, or the skin is too wide"
+    )
+    if not diverged:
+        return overflow
+    error = _divergence(simulation, diverged)
+    error.__cause__ = overflow if full else None
+    return error
+
+
+def _divergence(simulation: Simulation, diverged: list[int]) -> SimulationDiverged:
+    world, scene, features = diverged[0], simulation.scene, simulation.features
+    if features.per_world_parameters:
+        scene = with_parameters(scene, simulation.parameters.pick([world]))
+    status, model = simulation.state.world[world], simulation.model.of_world(world)
+    h = simulation.last_substep
+    cause = cause_of_divergence(scene, simulation.fidelity, model, features, h)
+    body = int(status["diverged"]) - 1
+    name = simulation.scene.solid_names[body]
+    return SimulationDiverged(world, body, name, float(status["time"]), cause, diverged)

@@ -1,0 +1,75 @@
+"""Snapshots: the complete state of worlds, saved and restored."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.analysis.parameter_limits import ParameterLimits
+from physics.model.state import State, copy
+from physics.scene.fidelity import Fidelity
+from physics.scene.parameters import Parameters
+from physics.scene.scene import Scene
+from physics.step.simulation import Simulation
+
+
+class Snapshot(NamedTuple):
+    """The complete state of worlds, hidden contact state included, and their scene and fidelity."""
+
+    scene: Scene
+    fidelity: Fidelity
+    state: State
+    parameters: Parameters | None = None  # of worlds with per-world parameters
+
+
+def save(simulation: Simulation) -> Snapshot:
+    """A snapshot of all worlds."""
+    everyone, own = simulation.everyone, simulation.parameters
+    parameters = own.pick(everyone) if simulation.features.per_world_parameters else None  # a copy
+    return Snapshot(simulation.scene, simulation.fidelity, copy(simulation.state), parameters)
+
+
+def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | None) -> None:
+    """Returns all worlds to a snapshot.
+
+    Args:
+        simulation: of the worlds.
+        saved: a snapshot of worlds of the same scene, fidelity and count.
+        limits: check parameters that differ from the present ones; None: don't.
+
+    Raises:
+        ValueError: a snapshot of other worlds; parameters for which the substep is too long. The
+            state is then unchanged.
+    """
+    what = _difference(simulation, saved)
+    if what:
+        raise ValueError(
+            f"saved must be a snapshot of a World of the same scene, fidelity and count; it has "
+            f"another {what}"
+        )
+    if saved.parameters is not None:
+        pairs = zip(simulation.parameters, saved.parameters, strict=True)
+        other = np.any([np.any(mine != theirs, axis=1) for mine, theirs in pairs], axis=0)
+        if other.any():
+            new = saved.parameters.pick(other)
+            if limits is not None:
+                limits.check(new, np.flatnonzero(other))
+            simulation.write_parameters(other, new)
+    for mine, theirs in zip(simulation.state, saved.state, strict=True):
+        mine[...] = theirs
+    simulation.changed()
+
+
+def _difference(simulation: Simulation, saved: Snapshot) -> str:
+    """In what the worlds of a snapshot differ; empty if they are alike."""
+    count = len(saved.state.world)
+    if count != simulation.count:
+        return f"count: {count} instead of {simulation.count}"
+    if saved.fidelity != simulation.fidelity:
+        ours = vars(simulation.fidelity)
+        fields = [f"{k}={v!r}" for k, v in vars(saved.fidelity).items() if v != ours[k]]
+        return f"fidelity: {', '.join(fields)}"
+    if saved.scene != simulation.scene:
+        return "scene"
+    if (saved.parameters is not None) != simulation.features.per_world_parameters:
+        return f"per_world_parameters: {saved.parameters is not None}"
+    return ""
