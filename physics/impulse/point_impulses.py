@@ -131,7 +131,7 @@ def apply_impulse(pair, point, i, px, py, pz):
 
 @stage
 def add_opposite(point, i, P, L, Q, M, x, y, z):
-    """Adds a vector at a point, and its moment, to P and L of the owner; subtracts both from Q and M.
+    """Adds a vector at a point and its moment to P and L of the owner; subtracts both from Q and M.
 
     The vector is an impulse in N s (P, Q: momenta) or a force in N (P, Q: forces).
     """
