@@ -26,7 +26,7 @@ demo: $(STAMP)
 	$(BIN)/rigid-envs demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not packaging"
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m "not packaging"
 
 package: $(STAMP)
 	$(BIN)/python -m pytest -q -m packaging
