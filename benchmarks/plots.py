@@ -35,7 +35,7 @@ PLOTS = {
         "work precision", work_precision.draw, ROOT / "docs/images/work_precision.png"
     ),
 }
-TASKS = ROOT / "docs/tasks.png"
+TASKS = ROOT / "docs/images/tasks.png"
 
 
 def run() -> None:

@@ -31,7 +31,7 @@ class SimulationDiverged(ArithmeticError):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickles the constructor's arguments, so worker processes can pass the error on."""
         parts = (self.world, self.body, self.name, self.time, self.cause, self.worlds)
-        return type(self), parts
+        return type(self), parts, vars(self)  # with its notes
 
 
 class ContactOverflow(RuntimeError):

@@ -5,7 +5,7 @@ There are three kinds of compiled functions:
 - a `sequence` is a stage that does little but call others, outside of loops over lanes;
 - an `entry` is called from Python, releases the GIL and is cached on disk.
 
-Numba's cache notices edits of the file that defines an entry, but not of the kernels that it calls.
+Numba's cache notices edits of the file that defines an entry, but not of the stages that it calls.
 So every entry mentions a local variable of its factory that is `SOURCES`, a hash of all sources of
 this package: numba hashes closure cells, and an edit anywhere in the package is a cache miss. (A
 hash that ignores comments would cost every process 80 ms when it starts; this one costs 2 ms.)
@@ -30,7 +30,7 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
-from physics.linking import Kernel, Linked, Sequence
+from physics.linking import EntryPipeline, SequencePipeline, StagePipeline
 
 Array = np.ndarray
 
@@ -60,17 +60,17 @@ LANES = 16
 # from Python
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
 _INLINE: Any = {"forceinline": True, "no_cfunc_wrapper": True, **_OPTIONS}
-_STAGE: Any = {"pipeline_class": Linked, **_INLINE}
+_STAGE: Any = {"pipeline_class": StagePipeline, **_INLINE}
 
 
 def stage(function: Any) -> Any:
-    """Inlines a function into what calls it; never called from Python."""
+    """Inlines a function into what calls it. From Python it runs as plain Python."""
     return register_jitable(**_STAGE)(function)
 
 
 def sequence(function: Any) -> Any:
     """A stage that is optimised only as part of its caller: half of the time to compile it."""
-    return register_jitable(pipeline_class=Sequence, **_INLINE)(function)
+    return register_jitable(pipeline_class=SequencePipeline, **_INLINE)(function)
 
 
 def at(value: Any, i: int) -> Any:
@@ -101,7 +101,7 @@ def large_entry(function: Any) -> Any:
 def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return _on_records(function)
-    compiled = njit(cache=True, nogil=True, pipeline_class=Kernel, **_OPTIONS)(function)
+    compiled = njit(cache=True, nogil=True, pipeline_class=EntryPipeline, **_OPTIONS)(function)
     direct: list[Any] = []
 
     @wraps(function)
@@ -122,14 +122,18 @@ def _entry(function: Any, level: int) -> Any:
 
 @contextmanager
 def _without_garbage_collection() -> Iterator[None]:
-    """Numba makes millions of objects that live until the end; searching them took 7 % of it."""
-    was_enabled = gc.isenabled()
+    """During the first call of an entry, which compiles it.
+
+    Numba makes millions of objects that live until the end; searching them took 7 % of the time.
+    """
+    if not gc.isenabled():
+        yield
+        return
     gc.disable()
     try:
         yield
     finally:
-        if was_enabled:
-            gc.enable()
+        gc.enable()
 
 
 class _Announcement(event.Listener):

@@ -5,9 +5,10 @@ each of them a library of its own, optimises it twice and emits machine code for
 links the optimised code, inlines it and optimises the whole again. Only the kernel itself runs. So
 
 - only the kernel is emitted; the functions within it are optimised and left at that;
-- a function that only calls others isn't even optimised before it is inlined;
-- the first of numba's two rounds of optimisation, which prepares for the removal of reference
-  counts, is left out: there are none;
+- a function that does little but call others isn't even optimised before it is inlined;
+- the first of numba's two rounds of optimisation is left out. It prepares for the removal of
+  reference counts, which these functions don't have, and simplifies loops before the second round
+  vectorises them; the results are bitwise the same without it;
 - passes that treat language features which kernels don't use are left out.
 
 docs/decisions/0015-linked-functions.md has the compile times.
@@ -36,8 +37,8 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-# what remains of numba's default pipeline; the lowering comes between the two
-_TYPING = (
+# what remains of numba's default pipeline before the lowering
+_BEFORE_LOWERING = (
     TranslateByteCode,
     FixupArgs,
     IRProcessing,
@@ -45,7 +46,7 @@ _TYPING = (
     DeadBranchPrune,
     GenericRewrites,
     ReconstructSSA,
-    DeadBranchPrune,  # a branch on a constant that is assigned in several places
+    DeadBranchPrune,  # again: variables are now assigned once, so more conditions are constant
     NopythonTypeInference,
     PreLowerStripPhis,
     IRLegalization,
@@ -56,7 +57,7 @@ _TYPING = (
 class _Flags(Flags):
     """Numba's flags of a compilation, compared by those that are set.
 
-    Numba compares flags forty thousand times for one kernel, and by default looks up all thirty.
+    Numba compares flags forty thousand times for one kernel, and by default looks up every option.
     """
 
     def __hash__(self) -> int:
@@ -67,7 +68,10 @@ class _Flags(Flags):
 
 
 class _Codegen:
-    """Numba's code generator without the environments of functions that have no address."""
+    """Numba's code generator, for functions that aren't emitted: sets no environment.
+
+    Environments serve Python objects, which these functions never touch, and need an address.
+    """
 
     def __init__(self, codegen: Any) -> None:
         self._codegen = codegen
@@ -76,7 +80,7 @@ class _Codegen:
         return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Environments serve Python objects, which these functions never touch."""
+        """Does nothing."""
 
 
 class _Library(JITCodeLibrary):
@@ -114,39 +118,23 @@ class _SequenceLibrary(_LinkedLibrary):
         pass
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
 class _Lowering(NativeLowering):
-    """Numba's lowering, into a library of another class."""
+    """Numba's lowering, into a library of the class that the pipeline names."""
 
-    _library: type[_Library]
+    _name: Any = "lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
+        codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
+        state.library = state.pipeline.library(codegen, name)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _KernelLowering(_Lowering):
-    _name: Any = "kernel_lowering"
-    _library = _Library
+class EntryPipeline(CompilerBase):
+    """For a function that Python calls: it is emitted."""
 
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkedLowering(_Lowering):
-    _name: Any = "linked_lowering"
-    _library = _LinkedLibrary
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _SequenceLowering(_Lowering):
-    _name: Any = "sequence_lowering"
-    _library = _SequenceLibrary
-
-
-class Kernel(CompilerBase):
-    """Pipeline of a function that Python calls: it is emitted."""
-
-    lowering: type[_Lowering] = _KernelLowering
+    library: type[_Library] = _Library
 
     def __init__(self, *arguments: Any) -> None:
         """The arguments are numba's."""
@@ -156,19 +144,19 @@ class Kernel(CompilerBase):
     def define_pipelines(self) -> list[PassManager]:
         """One pipeline, without a fallback."""
         manager = PassManager("kernel")
-        for one in (*_TYPING, self.lowering, NoPythonBackend):
+        for one in (*_BEFORE_LOWERING, _Lowering, NoPythonBackend):
             manager.add_pass(one, one.__name__)
         manager.finalize()
         return [manager]
 
 
-class Linked(Kernel):
-    """Pipeline of a function that only kernels call: it is optimised, and not emitted."""
+class StagePipeline(EntryPipeline):
+    """For a function that only compiled functions call: it is optimised, and not emitted."""
 
-    lowering = _LinkedLowering
+    library = _LinkedLibrary
 
 
-class Sequence(Kernel):
-    """Pipeline of a function that only calls others: it is neither optimised nor emitted."""
+class SequencePipeline(EntryPipeline):
+    """For a stage that does little but call others: it is neither optimised nor emitted."""
 
-    lowering = _SequenceLowering
+    library = _SequenceLibrary

@@ -91,7 +91,7 @@ class World:
             SimulationDiverged: a world became non-finite now, or did before and was neither reset
                 nor left out; the others have advanced.
             ContactOverflow: more pairs of particles are within the skin than there is room for. If
-                another world diverged in the same call, this is that error's `__cause__`.
+                another world diverged in the same call, this is a note of that error.
         """
         if not self._simulation.advance(positive("time", time), self._mask(worlds)):
             raise failure(self._simulation)

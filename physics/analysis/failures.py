@@ -9,10 +9,11 @@ from physics.step.simulation import Simulation
 def failure(simulation: Simulation) -> Exception:
     """The error to raise after a call in which worlds diverged or ran out of room for contacts.
 
-    If both happened, the overflow is the cause of the other error (`__cause__`): the next call
-    clears it.
+    If both happened, the divergence is raised with the overflow as a note. An overflow is reported
+    once.
     """
     full, diverged = simulation.failed("overflow"), simulation.failed("diverged")
+    simulation.state.world["overflow"][full] = 0  # a kernel clears those of running worlds only
     overflow = ContactOverflow(
         f"worlds {full}: two bodies have more than eight pairs of particles per particle within "
         "Fidelity.skin; they overlap deeply, or the skin is too wide"
@@ -20,7 +21,8 @@ def failure(simulation: Simulation) -> Exception:
     if not diverged:
         return overflow
     error = _divergence(simulation, diverged)
-    error.__cause__ = overflow if full else None
+    if full:
+        error.add_note(f"ContactOverflow as well: {overflow}")
     return error
 
 

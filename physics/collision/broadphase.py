@@ -1,11 +1,11 @@
 """Broadphase: which half-pairs need a new list of candidates.
 
-A list stays complete while owner and surface have moved relative to each other by no more than the
-skin; an empty list, by no more than the distance of the nearest sample. Over a plane only motion
-along its normal counts. Of a rotation only the motion of cores counts, because rounded surfaces
-rotate in place: a rolling ball is listed once. Each half-pair keeps that distance in
-`remaining_skin`; every drift reduces it, and a list is replaced when the next drift might exceed
-it.
+A list is complete while no sample outside of it can touch: until owner and surface have moved
+relative to each other by the skin or, if the list is empty, by at most the distance of the nearest
+sample. Over a plane only motion along its normal counts. Rotation counts as far as it moves the
+core, which is the shape without its rounding: a ball that rolls on a plane needs no new list.
+`remaining_skin` is how much of that distance is left. Every drift reduces it, and a list is
+replaced when the next drift might exceed it.
 """
 
 from physics.collision.candidate_list import make_clear, make_search
@@ -35,7 +35,7 @@ def make_search_half_pair(features):
 
     @stage
     def search_half_pair(model, state, workspace, g, k, least):
-        """Searches where less of the skin is left than `least` of it, or than the last drift took.
+        """Searches lanes with less skin left than the last drift took, or than `least` * the skin.
 
         The impulse law chooses a manifold among the candidates of a pair, so it searches both of
         the pair's half-pairs.
@@ -44,8 +44,8 @@ def make_search_half_pair(features):
         reverse = half_pair.reverse if impulse else -1
         relative = relative_pose_of(workspace, half_pair, workspace.relative[0])
         if reverse >= 0:
-            reversed_pair = model.half_pair[reverse]
-            back = relative_pose_of(workspace, reversed_pair, workspace.relative[1])
+            reverse_half_pair = model.half_pair[reverse]
+            back = relative_pose_of(workspace, reverse_half_pair, workspace.relative[1])
         else:
             back = relative
         for i in range(LANES):
@@ -91,7 +91,8 @@ def bound_motion_between(solid, other, relative_motion):
 def make_broadphase(features):
     """Stage that reduces the remaining skin by the last drift and replaces lists that need it.
 
-    The first substep of a collision step also replaces lists with less than half of their skin.
+    The first substep of a collision step, but for that of a call, also replaces lists with less
+    than half of their skin.
     """
     search_half_pair = make_search_half_pair(features)
 
@@ -119,7 +120,10 @@ def make_broadphase(features):
 
 @cached_by_features
 def make_forget(features):
-    """Stage that clears lists and memories in lanes whose state was set from outside."""
+    """Stage that clears lists and memories in lanes whose state was set from outside.
+
+    Of the refresh that follows only these lanes remember anything, see `lanes.end_refresh`.
+    """
     clear = make_clear(features)
 
     @stage
@@ -133,7 +137,7 @@ def make_forget(features):
                     for n in range(half_pair.slot_count):
                         clear(state.candidate[g, half_pair.first_slot + n], i)
                     live.count[i] = 0
-                    live.remaining_skin[i] = -1.0
+                    live.remaining_skin[i] = -1.0  # below zero: the broadphase searches it
                     live.previous_weight[i] = 0.0
                     live.previous_normal_force[i] = 0.0
         for i in range(LANES):

@@ -7,7 +7,7 @@ don't depend on the difference, within a process.
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 # rotation of bodies: none; with equal principal moments of inertia; general
 NO_ROTATION, ISOTROPIC, GENERAL = range(3)
@@ -47,6 +47,9 @@ class Features(NamedTuple):
     per_world_parameters: bool
 
 
+Made = TypeVar("Made")
+
+
 class _Reader:
     """Features that note which of them are read."""
 
@@ -59,17 +62,17 @@ class _Reader:
         return value
 
 
-def cached_by_features(make: Callable[..., Any]) -> Callable[..., Any]:
+def cached_by_features(make: Callable[..., Made]) -> Callable[..., Made]:
     """Caches make(features, *others) by `others` and by those features that it reads.
 
     What `make` reads through the functions that it calls counts as well. Scenes whose features
     differ elsewhere get the same stage, and numba compiles it once for all of them. Not for an
     entry: it is called without a look at the types of its arguments, which depend on all features.
     """
-    made: dict[tuple[Any, ...], list[tuple[dict[str, Any], Any]]] = {}
+    made: dict[tuple[Any, ...], list[tuple[dict[str, Any], Made]]] = {}
 
     @wraps(make)
-    def cached(features: Any, *others: Any) -> Any:
+    def cached(features: Any, *others: Any) -> Made:
         caller = features if isinstance(features, _Reader) else _Reader(features)
         actual, known = caller.features, made.setdefault(others, [])
         for read, stage in known:

@@ -22,7 +22,7 @@ Array = np.ndarray
 DYNAMIC = np.dtype(
     [
         ("is_body", "i8"),  # 1 for a body, 0 for a drive
-        ("core_reach", "f8"),  # m, largest distance from the centre of a point that rotation moves
+        ("core_reach", "f8"),  # m, from the centre to the farthest point that rotation moves
         ("inverse_mass", "f8"),  # 1/kg
         ("inertia", "f8", (3,)),  # kg m^2, principal moments; infinite for drives
         ("inverse_inertia", "f8", (3,)),  # 1/(kg m^2); 0 for drives

@@ -38,7 +38,7 @@ SOLID = np.dtype(
         ("current_weight", "f8", (LANES,)),  # of the samples in contact
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
-        ("remembers", "f8", (LANES,)),  # 1 where contacts remember this step
+        ("updates_candidates", "f8", (LANES,)),  # 1 where they remember this step: not in a refresh
     ],
     align=True,
 )
@@ -106,7 +106,7 @@ LANE = np.dtype(
     [
         ("active", "i8", (LANES,)),  # 0: no world, one that has diverged, or one not advanced
         ("needs_refresh", "i8", (LANES,)),
-        ("updates_memory", "i8", (LANES,)),  # 1: contacts remember this step
+        ("updates_memory", "i8", (LANES,)),  # 0: inactive, or a refresh of other lanes passes by
         ("start", "f8", (LANES,)),  # s, time at which this call began
         # of instantaneous collisions, see impulse/restitution.py
         ("colliding", "i8", (LANES,)),

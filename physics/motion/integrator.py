@@ -1,13 +1,13 @@
 """Kick-drift-kick for translation, the midpoint rule for rotation: second order.
 
-The state is (c, q, P, L): position, quaternion, momentum, angular momentum. A substep is half a
+The state is (x, q, P, L): position, quaternion, momentum, angular momentum. A substep is half a
 kick, a drift, new forces, half a kick. Forces that depend on velocity see the half-step velocity of
 the drift. Without torque L stays bitwise constant while omega = J^-1 L does not: the midpoint rule
 rotates by the omega that belongs to the orientation half a step ahead.
 
 The midpoint rule does not conserve energy where L would rotate the body by a large angle about its
-slimmest axis. Such a rotation is made in parts, each within SMALL_ROTATION up to 30 rad per step
-(evidence: docs/decisions).
+slimmest axis. Such a rotation is made in up to MOST_PARTS parts of at most SMALL_ROTATION,
+0.3 rad, which suffices for 30 rad per substep (evidence: docs/decisions).
 """
 
 import math
@@ -17,7 +17,7 @@ from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
 from physics.motion.kinematics import angular_velocity_of
 from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far
 
-# parts of one rotation at most: beyond 30 rad per substep they are longer than SMALL_ROTATION
+# largest number of parts of a rotation; beyond 30 rad per substep they exceed SMALL_ROTATION
 MOST_PARTS = 100.0
 
 
@@ -47,7 +47,10 @@ def make_kick(features):
 
 @cached_by_features
 def make_midpoint_rotation(features, rotate_quaternion):
-    """Formula of the midpoint rule: returns the new quaternion and the omega it used."""
+    """Formula of the midpoint rule: returns the new quaternion and the omega it used.
+
+    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2).
+    """
     rotation = features.rotation
 
     @stage
@@ -57,7 +60,7 @@ def make_midpoint_rotation(features, rotate_quaternion):
             ox, oy, oz = angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
             hx, hy, hz, hw = rotate_quaternion(x, y, z, w, half * ox, half * oy, half * oz)
             ox, oy, oz = angular_velocity_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
-        else:
+        else:  # equal moments: omega is parallel to L
             ox, oy, oz = jx * lx, jx * ly, jx * lz
         x, y, z, w = rotate_quaternion(x, y, z, w, time * ox, time * oy, time * oz)
         return x, y, z, w, ox, oy, oz
@@ -74,7 +77,7 @@ def small_rotation_limit(jx, jy, jz, time):
 
 @cached_by_features
 def make_drift(features):
-    """Stage that moves and rotates every dynamic body for a time, and bounds how far it moved."""
+    """Stage that moves bodies and drives, rotates bodies, and bounds the motion by rotation."""
     rotation = features.rotation
     midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
     midpoint_rotation_far = make_midpoint_rotation(features, rotate_quaternion_far)
@@ -101,7 +104,7 @@ def make_drift(features):
             far = 0
             for i in range(LANES):
                 jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                square, reach = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
+                square, span = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
                 x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
                 nx, ny, nz, nw, ox, oy, oz = midpoint_rotation(
@@ -112,18 +115,22 @@ def make_drift(features):
                 q[1, i] = ny if small else y
                 q[2, i] = nz if small else z
                 q[3, i] = nw if small else w
-                # the sum of absolute values is an upper bound of the length, and needs no root
-                rotation_bound[i] = reach * (abs(ox) + abs(oy) + abs(oz)) if small else math.inf
+                # the sum of absolute values is an upper bound of the length, and needs no root; inf
+                # marks lanes for the second loop, which makes large rotations in parts
+                rotation_bound[i] = span * (abs(ox) + abs(oy) + abs(oz)) if small else math.inf
                 far += 0 if small else 1
             if far > 0:
                 for i in range(LANES):
                     jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                    square, reach = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
+                    square, span = (
+                        small_rotation_limit(jx, jy, jz, time),
+                        time * at(reaches, i),
+                    )
                     lx, ly, lz = L[0, i], L[1, i], L[2, i]
                     if rotation_bound[i] == math.inf:
                         far_by = math.sqrt((lx * lx + ly * ly + lz * lz) / square)
                         parts = 1
-                        # equal moments need one part; a comparison with NaN is false
+                        # equal moments need one part; so does NaN, which ceil could not convert
                         if rotation == GENERAL and far_by > 1.0 and not jx == jy == jz:
                             parts = math.ceil(min(MOST_PARTS, far_by))
                         x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
@@ -138,6 +145,6 @@ def make_drift(features):
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        rotation_bound[i] = reach * fastest
+                        rotation_bound[i] = span * fastest
 
     return drift

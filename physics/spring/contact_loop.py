@@ -54,7 +54,7 @@ def make_contact_loop(features, kind, report):
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
-        current_weight, remembers = relative.current_weight, relative.remembers
+        current_weight, updates = relative.current_weight, relative.updates_candidates
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals = constants.face_normals != 0
         rolling, spinning = constants.rolling, constants.spinning
@@ -114,7 +114,7 @@ def make_contact_loop(features, kind, report):
                 # an empty slot stays empty, whatever the lane's state
                 normal = normal if weight > 0.0 else 0.0
                 impact_speed = impact_speed if weight > 0.0 else 0.0
-                updates_memory = remembers[i] != 0.0
+                updates_memory = updates[i] != 0.0
                 memory[SPEED, i] = impact_speed if updates_memory else memory[SPEED, i]
                 memory[FORCE, i] = normal if updates_memory else memory[FORCE, i]
                 kept = approach if weight > 0.0 else 0.0

@@ -15,7 +15,7 @@ from physics.scene.shapes import BOX, PLANE
 from physics.spring.contact_loop import make_contact_loop
 from physics.spring.energy_correction import make_energy_correction
 
-# N, of a pair; below it W / F could overflow
+# N; below this normal force of a pair, weight / force could overflow
 _LEAST_FORCE = 1e-200
 
 
@@ -23,7 +23,7 @@ _LEAST_FORCE = 1e-200
 def make_half_pair(features, report):
     """Sequence that computes the forces of one half-pair, and adds its wrenches to both solids.
 
-    `rows`: [slots] of REPORT, written if `report`; else ().
+    `rows`: one `contact_loop.REPORT` for each slot of all half-pairs, written if `report`; else ().
     """
     of_kind = by_surface_kind(features, lambda kind: make_half_pair_of_kind(features, kind, report))
 
@@ -51,7 +51,7 @@ def make_half_pair_of_kind(features, kind, report):
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
         # a plane is in the world frame, as the owner is: the loop reads the owner itself and adds
-        # the forces straight to it; planes are fixed and need none
+        # the forces straight to it; a plane never moves, so it gets none
         relative = owner if plane else workspace.relative[0]
         begin_half_pair(model, workspace, k, h, relative)
         if not plane:
@@ -59,7 +59,8 @@ def make_half_pair_of_kind(features, kind, report):
             relative_velocities(owner, frame, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
-        # before the loop, which overwrites the faces of the last step; a refresh has no step
+        # before the loop, which overwrites the box face that each candidate remembers; not in a
+        # refresh, where h = 0
         if box and constants.face_normals == 0 and h > 0.0:
             correct_energy(slots, candidate, relative, constants, h)
         contact_loop(slots, candidate, relative, constants, h, out)
@@ -80,8 +81,8 @@ def make_begin_half_pair(features):
 
         m is the pair mass and h the step. W is the sum of the weights of the samples that were in
         contact in the last step, over all half-pairs of the pair, and F their normal force. Both
-        results are zero where nothing was in contact. Candidates don't remember a step of a refresh
-        (h = 0), nor of a lane that isn't advanced. All of it is written to `relative`, one array,
+        results are zero where nothing was in contact. Candidates keep their memory in a refresh
+        (h = 0) and in lanes that aren't advanced. All of it is written to `relative`, one array,
         because LLVM checks before every run of the loop that its arrays don't overlap.
         """
         live, half_pair, active = (
@@ -89,6 +90,7 @@ def make_begin_half_pair(features):
             model.half_pair[k],
             workspace.lane[0].active,
         )
+        # without a reverse half-pair (-1) row 0 is named, and not read
         other = workspace.half_pair[max(half_pair.reverse, 0)]
         pair_mass = half_pair.pair_mass
         if compound:
@@ -105,7 +107,7 @@ def make_begin_half_pair(features):
                 )
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
             relative.inverse_mean_force[i] = weight / force if force > _LEAST_FORCE else 0.0
-            relative.remembers[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
+            relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
             relative.normal_force_sum[i] = 0.0
 
@@ -153,9 +155,10 @@ def add_wrenches(owner, surface, frame, relative):
 
 @cached_by_features
 def make_contacts(features):
-    """Sequence that adds the contact forces of all half-pairs, and records contacts.
+    """Sequence that adds all contact forces, and records normal forces and first touches.
 
-    It takes the arguments of the impulse law, which alone needs `drifted`.
+    `g` is the lane group, `elapsed` the time in s since `advance` began. It takes the arguments of
+    the impulse law, which alone needs `drifted`, the time in s that the last drift took.
     """
     half_pair = make_half_pair(features, False)
 
