@@ -18,6 +18,7 @@ and infinity keep their meaning.
 import gc
 import hashlib
 import logging
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -103,6 +104,14 @@ def _entry(function: Any, level: int) -> Any:
         return _on_records(function)
     compiled = njit(cache=True, nogil=True, pipeline_class=EntryPipeline, **_OPTIONS)(function)
     direct: list[Any] = []
+    first_call = threading.Lock()  # other threads wait, so a compilation is logged once
+
+    def compile_and_call(*arguments: Any) -> Any:
+        announcement = event.install_listener("numba:compile", _Announcement(compiled, level))
+        with announcement, _without_garbage_collection():
+            result = compiled(*arguments)
+        direct.append(compiled.get_overload(tuple(map(typeof, arguments))))
+        return result
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
@@ -110,11 +119,10 @@ def _entry(function: Any, level: int) -> Any:
         # dozen record arrays at every call would take 3 us, a fifth of a single world's frame
         if direct:
             return direct[0](*arguments)
-        announcement = event.install_listener("numba:compile", _Announcement(compiled, level))
-        with announcement, _without_garbage_collection():
-            result = compiled(*arguments)
-        direct.append(compiled.get_overload(tuple(map(typeof, arguments))))
-        return result
+        with first_call:
+            if not direct:
+                return compile_and_call(*arguments)
+        return direct[0](*arguments)
 
     call.compiled = compiled  # type: ignore[attr-defined]
     return call

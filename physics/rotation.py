@@ -1,9 +1,9 @@
 """Rotations: unit quaternions (x, y, z, w), rotation matrices, and their time derivatives.
 
-With the angular velocity in the world frame and the conventions of the lecture (r' = omega x r,
-J = R J0 R^T), the quaternion moves as q' = 1/2 omega (x) q. The matrix Q printed in the lesson
-is q (x) omega, which belongs to a body-frame omega; the vector part's cross product has the other
-sign here. test_rotation.py checks this against the matrix equation R' = omega x R.
+With the angular velocity in the world frame (r' = omega x r, J = R J0 R^T) the quaternion moves as
+q' = 1/2 omega (x) q. Some texts print q (x) omega, which belongs to an omega in the body frame; the
+cross product of its vector part has the other sign. test_rotation.py checks this against the matrix
+equation R' = omega x R.
 """
 
 import math

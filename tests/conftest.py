@@ -4,6 +4,7 @@ import hypothesis
 import pytest
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # two workers share two cores
 
 # An outcome must depend neither on the speed of the machine nor on chance; stress looks further.
 hypothesis.settings.register_profile("default", deadline=None, derandomize=True, max_examples=50)

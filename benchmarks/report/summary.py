@@ -16,7 +16,6 @@ def summary(saved: Saved) -> Table:
         position = table.columns.index(ratio)
         rows.append([f"{task}-v0", own[table.columns.index("median")], own[position]])
     machine = saved.runs["speed"]["machine"]
-    title = (
-        f"4,096 worlds, preset `balanced`, {machine['threads']} threads ({machine['processor']})"
-    )
+    who = f"{machine['threads']} threads ({machine['processor']})"
+    title = f"4,096 worlds, dense reward, preset `balanced`, {who}"
     return Table("summary", title, ["environment", "env steps/s", "ratio to MuJoCo rollout"], rows)

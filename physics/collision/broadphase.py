@@ -1,11 +1,11 @@
 """Broadphase: which half-pairs need a new list of candidates.
 
 A list is complete while no sample outside of it can touch: until owner and surface have moved
-relative to each other by the skin or, if the list is empty, by at most the distance of the nearest
-sample. Over a plane only motion along its normal counts. Rotation counts as far as it moves the
-core, which is the shape without its rounding: a ball that rolls on a plane needs no new list.
-`remaining_skin` is how much of that distance is left. Every drift reduces it, and a list is
-replaced when the next drift might exceed it.
+relative to each other by the skin or, if the list is empty, by a lower bound of the distance of the
+nearest sample. Over a plane only motion along its normal counts. Rotation counts as far as it moves
+the core, which is the shape without its rounding: a ball that rolls on a plane needs no new list.
+`remaining_skin` is how much of that distance is left. Every drift reduces it. A list is replaced
+when less is left than the last drift took, which stands for the next one.
 """
 
 from physics.collision.candidate_list import make_clear, make_search
@@ -91,8 +91,8 @@ def bound_motion_between(solid, other, relative_motion):
 def make_broadphase(features):
     """Stage that reduces the remaining skin by the last drift and replaces lists that need it.
 
-    The first substep of a collision step, but for that of a call, also replaces lists with less
-    than half of their skin.
+    The first substep of a collision step also replaces lists with less than half of their skin. The
+    first collision step of a call of `advance` does not.
     """
     search_half_pair = make_search_half_pair(features)
 
@@ -122,7 +122,8 @@ def make_broadphase(features):
 def make_forget(features):
     """Stage that clears lists and memories in lanes whose state was set from outside.
 
-    Of the refresh that follows only these lanes remember anything, see `lanes.end_refresh`.
+    In the refresh that follows only these lanes update their contact memory; `lanes.end_refresh`
+    lets all active lanes do so again.
     """
     clear = make_clear(features)
 

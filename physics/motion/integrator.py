@@ -77,7 +77,11 @@ def small_rotation_limit(jx, jy, jz, time):
 
 @cached_by_features
 def make_drift(features):
-    """Stage that moves bodies and drives, rotates bodies, and bounds the motion by rotation."""
+    """Stage that moves bodies and drives, and rotates bodies.
+
+    For the broadphase it computes an upper bound of how far rotation moves any point of a core,
+    whose farthest point is `core_reach` from the centre.
+    """
     rotation = features.rotation
     midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
     midpoint_rotation_far = make_midpoint_rotation(features, rotate_quaternion_far)

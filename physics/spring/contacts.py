@@ -46,6 +46,7 @@ def make_half_pair_of_kind(features, kind, report):
     def half_pair(model, state, workspace, rows, g, k, h):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
+        # a part of a compound has a row of its own in `solid`; forces act on the compound
         frame = workspace.solid[constants.frame] if compound else surface
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
@@ -59,7 +60,8 @@ def make_half_pair_of_kind(features, kind, report):
             relative_velocities(owner, frame, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
-        # before the loop, which overwrites the box face that each candidate remembers; not in a
+        # Only balls and capsules (`face_normals` 0) see the normal leap between faces of a box.
+        # Before the loop, which overwrites the face that each candidate remembers. Not in a
         # refresh, where h = 0
         if box and constants.face_normals == 0 and h > 0.0:
             correct_energy(slots, candidate, relative, constants, h)
@@ -77,7 +79,10 @@ def make_begin_half_pair(features):
 
     @stage
     def begin_half_pair(model, workspace, k, h, relative):
-        """Load rate m / (W h) and inverse mean force W / F of a pair, see spring/hunt_crossley.py.
+        """Prepares the estimate of the load on each sample, see spring/hunt_crossley.py.
+
+        The load rate m / (W h) turns a change of velocity into a force; W / F is the inverse of the
+        mean force.
 
         m is the pair mass and h the step. W is the sum of the weights of the samples that were in
         contact in the last step, over all half-pairs of the pair, and F their normal force. Both
@@ -97,7 +102,7 @@ def make_begin_half_pair(features):
             sum_of_pair(model, workspace, k, relative.current_weight, relative.normal_force_sum)
         for i in range(LANES):
             rate = at(pair_mass, i) / h if h > 0.0 else 0.0
-            if compound:
+            if compound:  # until the loop these two fields are scratch, cleared below
                 weight, force = relative.current_weight[i], relative.normal_force_sum[i]
             else:
                 both = half_pair.reverse >= 0
@@ -179,6 +184,7 @@ def make_contacts(features):
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:
+                # also makes the current normal force the previous one
                 record_contacts(model, state, workspace, g, k, live.current_normal_force, elapsed)
                 previous, current = live.previous_weight, live.current_weight
                 for i in range(LANES):

@@ -25,7 +25,7 @@ from physics import Body, Scene, Sphere, World
 from physics.step.time_layers import make_advance
 lines = []
 logging.getLogger("physics").addFilter(lambda record: lines.append(record.getMessage()))
-world = World(Scene([Body(Sphere(0.1))]))
+world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2)  # both wait for one compilation
 world.advance(1.0)
 stats = make_advance(world.features).compiled.stats
 misses = sum(stats.cache_misses.values())

@@ -6,7 +6,7 @@ from pathlib import Path
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import Evaluation, evaluate, print_evaluation
 from training.results.plot import plot_learning_curves
-from training.results.record import record
+from training.results.video import record
 from training.runs.run_folder import RunFolder
 from training.sb3.train import TrainResult, train
 from training.settings.config import TrainConfig

@@ -1,6 +1,7 @@
 """Command-line flags of all commands, and the valid values of their numbers."""
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
@@ -263,10 +264,8 @@ def whole(text: str) -> int:
 
 
 def _integer(text: str, least: int) -> int:
-    try:
+    with suppress(ValueError):
         value = float(text)
         if value >= least and value.is_integer():
             return int(value)
-    except ValueError:
-        pass
     raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least {least}")

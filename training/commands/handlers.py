@@ -66,7 +66,7 @@ def scripted(options: argparse.Namespace) -> int:
 
 def record(options: argparse.Namespace) -> int:
     """Records a video of a policy."""
-    from training.results import record as recording
+    from training.results import video
     from training.results.evaluate import FIRST_SEED
 
     policy = policy_of(options)
@@ -74,14 +74,14 @@ def record(options: argparse.Namespace) -> int:
     default = (policy.folder or options.log_folder / policy.name) / "video.mp4"
     if given is not None and given.suffix == ".policy":  # its folder may contain other policies
         default = given.with_suffix(".mp4")
-    video, still = recording.record(
+    path, still = video.record(
         policy,
         options.output or default,
         episodes=options.n_episodes,
         seed=FIRST_SEED if options.seed is None else options.seed,
         **env_kwargs_of(options),
     )
-    print(f"video       {video}\nstill image {still}")
+    print(f"video       {path}\nstill image {still}")
     return 0
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from training.policies.policy_file import read_policy
 from training.results.plot import draw_learning_curves, read_curve
-from training.results.record import record
-from training.results.recording import MAX_FILE_BYTES, record_run
+from training.results.record_run import MAX_FILE_BYTES, record_run
 from training.results.result import Result, read_results
 from training.results.results_page import by_kind, image_paths, write_pages
+from training.results.video import record
 from training.runs.run_folder import RunFolder
 from training.settings.config import ALGORITHMS
 from training.settings.errors import UsageError, check_exists

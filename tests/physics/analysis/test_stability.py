@@ -104,14 +104,14 @@ def runs_away(some, damping, start, step):
         ("light on heavy", "hunt_crossley", 0.5),
     ],
 )
-def test_the_largest_stable_step_is_predicted_within_a_tenth(kind, damping, restitution):
+def test_the_largest_stable_step_is_predicted_within_a_tenth(kind, damping, restitution, stress):
     some = scene(kind, restitution)
     start = World(some, Fidelity(substep=2e-5, damping=damping), allow_unstable=True)
     start.advance(1.0)
     limit = predicted(some, damping, start)
-    for share in (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9):
+    for share in (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9) if stress else (0.1, 0.5, 0.9):
         assert not runs_away(some, damping, start, share * limit), share
-    for share in (1.1, 1.2):
+    for share in (1.1, 1.2) if stress else (1.1,):
         assert runs_away(some, damping, start, share * limit), share
 
 

@@ -9,7 +9,7 @@ from training.policies.policy import Policy, scripted_policy
 from training.policies.trained_policy import trained_policy
 from training.results import evaluate as evaluate_module
 from training.results.evaluate import evaluate, print_evaluation, wilson_interval
-from training.results.record import record
+from training.results.video import record
 from training.sb3.train import train
 from training.scripted import CONTROLLERS
 from training.settings.errors import UsageError

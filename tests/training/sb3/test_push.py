@@ -9,7 +9,7 @@ from stable_baselines3.her import HerReplayBuffer
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.results.plot import plot_learning_curves
-from training.results.record import record
+from training.results.video import record
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.config_file import load_config

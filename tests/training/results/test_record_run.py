@@ -9,7 +9,7 @@ import pytest
 from tests.training.results.recorded import PLACE, change, update
 from training.policies.policy_file import load_policy_file, read_policy
 from training.results.evaluate import FIRST_SEED, evaluate
-from training.results.recording import ROWS, _command
+from training.results.record_run import ROWS, _command
 from training.results.result import read_result, read_results
 from training.results.results_page import check_pages
 from training.runs.run_folder import RunFolder

@@ -7,7 +7,7 @@ from PIL import Image
 from tests.training.reach import straight_to_the_goal
 from training.policies.policy import Policy, scripted_policy
 from training.results.gif import GifWriter
-from training.results.record import record
+from training.results.video import record
 
 
 @pytest.fixture
