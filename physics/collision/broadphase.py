@@ -5,7 +5,8 @@ relative to each other by the skin or, if the list is empty, by a lower bound of
 nearest sample. Over a plane only motion along its normal counts. Rotation counts as far as it moves
 the core, which is the shape without its rounding: a ball that rolls on a plane needs no new list.
 `remaining_skin` is how much of that distance is left. Every drift reduces it. A list is replaced
-when less is left than the last drift took, which stands for the next one.
+when less is left than the last drift took: the next drift is expected to take as much, and forces
+are computed right after it.
 """
 
 from physics.collision.candidate_list import make_clear, make_search
@@ -37,8 +38,8 @@ def make_search_half_pair(features):
     def search_half_pair(model, state, workspace, g, k, least):
         """Searches lanes with less skin left than the last drift took, or than `least` * the skin.
 
-        The impulse law chooses a manifold among the candidates of a pair, so it searches both of
-        the pair's half-pairs.
+        The impulse law keeps at most four candidates of two faces (a manifold), chosen from both
+        half-pairs of the pair, so it searches both.
         """
         half_pair, live = model.half_pair[k], workspace.half_pair[k]
         reverse = half_pair.reverse if impulse else -1

@@ -49,7 +49,9 @@ def make_kick(features):
 def make_midpoint_rotation(features, rotate_quaternion):
     """Formula of the midpoint rule: returns the new quaternion and the omega it used.
 
-    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2).
+    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2). `features.rotation` is
+    NO_ROTATION, ISOTROPIC (equal moments) or GENERAL. `rotate_quaternion` is that of small angles
+    or, for any angle, `rotate_quaternion_far`.
     """
     rotation = features.rotation
 

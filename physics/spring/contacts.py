@@ -1,7 +1,7 @@
 """Contact forces of the spring law: every half-pair's candidates, and the wrenches on both solids.
 
 Both solids feel opposite forces at the contact point, so momentum and angular momentum are
-conserved.
+conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in s, 0 in a refresh.
 """
 
 from physics.collision.compound_frames import mark_hidden_faces
@@ -46,7 +46,7 @@ def make_half_pair_of_kind(features, kind, report):
     def half_pair(model, state, workspace, rows, g, k, h):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
-        # a part of a compound has a row of its own in `solid`; forces act on the compound
+        # of a compound `frame` is the part that is touched, `surface` the whole that forces act on
         frame = workspace.solid[constants.frame] if compound else surface
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
@@ -60,9 +60,9 @@ def make_half_pair_of_kind(features, kind, report):
             relative_velocities(owner, frame, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
-        # Only balls and capsules (`face_normals` 0) see the normal leap between faces of a box.
-        # Before the loop, which overwrites the face that each candidate remembers. Not in a
-        # refresh, where h = 0
+        # The normal on a ball or capsule (`face_normals` 0) can leap from face to face of a box
+        # within a step and add energy, which this removes. Before the loop, which overwrites the
+        # face that each candidate remembers. Not in a refresh, where h = 0
         if box and constants.face_normals == 0 and h > 0.0:
             correct_energy(slots, candidate, relative, constants, h)
         contact_loop(slots, candidate, relative, constants, h, out)
@@ -162,8 +162,8 @@ def add_wrenches(owner, surface, frame, relative):
 def make_contacts(features):
     """Sequence that adds all contact forces, and records normal forces and first touches.
 
-    `g` is the lane group, `elapsed` the time in s since `advance` began. It takes the arguments of
-    the impulse law, which alone needs `drifted`, the time in s that the last drift took.
+    `elapsed` is the time in s since `advance` began. It takes the arguments of the impulse law,
+    which alone needs `drifted`, the time in s that the last drift took.
     """
     half_pair = make_half_pair(features, False)
 
