@@ -70,7 +70,7 @@ def stage(function: Any) -> Any:
 
 
 def sequence(function: Any) -> Any:
-    """A stage that is optimised only as part of its caller: half of the time to compile it."""
+    """A stage that is optimised only as part of its caller, which compiles faster."""
     return register_jitable(pipeline_class=SequencePipeline, **_INLINE)(function)
 
 
