@@ -3,12 +3,7 @@
 There are three kinds of compiled functions:
 - a `stage` is inlined into its caller: a stage of the substep, or a formula in a loop over lanes;
 - a `sequence` is a stage that does little but call others, outside of loops over lanes;
-- an `entry` is called from Python, releases the GIL and is cached on disk.
-
-Numba's cache notices edits of the file that defines an entry, but not of the stages that it calls.
-So every entry mentions a local variable of its factory that is `SOURCES`, a hash of all sources of
-this package: numba hashes closure cells, and an edit anywhere in the package is a cache miss. (A
-hash that ignores comments would cost every process 80 ms when it starts; this one costs 2 ms.)
+- an `entry` is called from Python, releases the GIL and is cached on disk (see `code_cache`).
 
 The only floating-point licence is `contract` (fused multiply-add). Every world runs the same
 instructions in its own vector lane, so its result is bitwise independent of the other lanes; NaN
@@ -16,14 +11,12 @@ and infinity keep their meaning.
 """
 
 import gc
-import hashlib
 import logging
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import wraps
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,19 +30,6 @@ Array = np.ndarray
 
 # "compiling ..." when a kernel isn't in the cache, and how long it took
 LOGGER = logging.getLogger("physics")
-
-_PACKAGE = Path(__file__).parent
-
-
-def _hash_sources() -> int:
-    digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode())
-        digest.update(path.read_bytes())
-    return int.from_bytes(digest.digest()[:7], "big")  # a numba integer has eight bytes, signed
-
-
-SOURCES: int = _hash_sources()
 
 # Worlds that a kernel works on side by side, one per vector lane: two vectors of AVX-512 or four of
 # AVX2. LLVM checks before every run of a loop that its arrays don't overlap, and doesn't vectorise

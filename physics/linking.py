@@ -14,11 +14,14 @@ links the optimised code, inlines it and optimises the whole again. Only the ker
 docs/decisions/0015-linked-functions.md has the compile times.
 """
 
+from copy import copy
 from typing import Any
 
+import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, Flags
+from numba.core.compiler import CompilerBase, Flags, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.environment import Environment
 from numba.core.typed_passes import (
     AnnotateTypes,
     IRLegalization,
@@ -36,6 +39,8 @@ from numba.core.untyped_passes import (
     RewriteSemanticConstants,
     TranslateByteCode,
 )
+
+from physics.code_cache import StageFile, is_cacheable
 
 # what remains of numba's default pipeline before the lowering
 _BEFORE_LOWERING = (
@@ -126,6 +131,7 @@ class _Lowering(NativeLowering):
 
     def run_pass(self, state: Any) -> bool:
         codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
+        state.func_id.unique_id = state.pipeline.symbol(state.func_id.unique_id)
         state.library = state.pipeline.library(codegen, name)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
@@ -141,6 +147,10 @@ class EntryPipeline(CompilerBase):
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
 
+    def symbol(self, number: int) -> int:
+        """Makes the names of a function's symbols unique: here numba's running number."""
+        return number
+
     def define_pipelines(self) -> list[PassManager]:
         """One pipeline, without a fallback."""
         manager = PassManager("kernel")
@@ -151,9 +161,49 @@ class EntryPipeline(CompilerBase):
 
 
 class StagePipeline(EntryPipeline):
-    """For a function that only compiled functions call: it is optimised, and not emitted."""
+    """For a function that only compiled functions call: it is optimised, not emitted, and cached.
+
+    Running numbers start anew in every process, so symbols of a stage are named by its digest. All
+    that a stage calls is inlined, so its bitcode defines nothing else.
+    """
 
     library = _LinkedLibrary
+
+    def symbol(self, number: int) -> int:
+        """The digest, if there is one."""
+        return int(self._file.digest, 16) if self._file else number
+
+    def compile_extra(self, func: Any) -> Any:
+        """Takes the compiled stage from its file, or compiles it and writes the file."""
+        self._file: StageFile | None = None
+        if not is_cacheable(func):
+            return super().compile_extra(func)
+        target = self.state.targetctx.codegen().magic_tuple()
+        self._file = StageFile(func, self.state.args, target)
+        saved = self._file.load()
+        return self._compile(func, self._file) if saved is None else self._restore(*saved)
+
+    def _compile(self, func: Any, file: StageFile) -> Any:
+        result = super().compile_extra(func)
+        described, library = copy(result.fndesc), result.library
+        described.typemap = described.calltypes = None  # large, and only for the lowering
+        module = library._final_module
+        # a function that wasn't inlined would keep its running number, which isn't unique on disk
+        if sum(not function.is_declaration for function in module.functions) == 1:
+            file.save((library.name, module.as_bitcode(), described, result.signature))
+        return result
+
+    def _restore(self, name: str, bitcode: bytes, described: Any, signature: Any) -> Any:
+        context = self.state.targetctx
+        library = self.library(context.codegen(), name)
+        library._final_module = llvm.parse_bitcode(bitcode)
+        library._finalize_final_module()
+        function = context.get_executable(library, described, Environment.from_fndesc(described))
+        context.insert_user_function(function, described, [library])
+        return compile_result(
+            typing_context=self.state.typingctx, target_context=context, entry_point=function,
+            library=library, fndesc=described, signature=signature, objectmode=False, lifted=(),
+        )  # fmt: skip
 
 
 class SequencePipeline(EntryPipeline):

@@ -5,6 +5,7 @@ the half-pair; which ones are compiled depends on the features.
 """
 
 import inspect
+from typing import Any
 
 from physics.jit import sequence, stage
 from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
@@ -39,16 +40,17 @@ def by_surface_kind(features, make):
     if not functions:
         return _nothing
     parameters = ", ".join(inspect.signature(next(iter(functions.values()))).parameters)
-    lines = [f"def call(kind, {parameters}):"]
     *first, last = functions
+    lines = [f"def enclose({', '.join(functions)}):", f"    def call(kind, {parameters}):"]
     for name in first:
         lines += [
-            f"    if kind == {name.removeprefix('on_')}:",
-            f"        return {name}({parameters})",
+            f"        if kind == {name.removeprefix('on_')}:",
+            f"            return {name}({parameters})",
         ]
-    lines.append(f"    return {last}({parameters})")
-    exec("\n".join(lines), functions)
-    return sequence(functions["call"])
+    lines += [f"        return {last}({parameters})", "    return call"]
+    namespace: dict[str, Any] = {"__name__": __name__}
+    exec("\n".join(lines), namespace)
+    return sequence(namespace["enclose"](**functions))
 
 
 @stage

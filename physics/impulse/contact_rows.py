@@ -152,7 +152,10 @@ def make_contact_rows_of_kind(features, kind):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
         frame = workspace.solid[constants.frame] if compound else surface
-        A, B = workspace.tensor[constants.owner].entry, workspace.tensor[constants.surface].entry
+        A, B = (
+            workspace.tensor[constants.owner].component,
+            workspace.tensor[constants.surface].component,
+        )
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         points = workspace.contact_row[first : first + slots]

@@ -38,8 +38,8 @@ def operands_of(model, workspace, k):
         workspace.contact_row[first : first + slots],
         workspace.solid[o : o + 1],
         workspace.solid[s : s + 1],
-        workspace.tensor[o].entry,
-        workspace.tensor[s].entry,
+        workspace.tensor[o].component,
+        workspace.tensor[s].component,
         half_pair.owner_inverse_mass,
         half_pair.surface_inverse_mass,
     )
@@ -50,28 +50,28 @@ def rotate_inertia(model, workspace):
     """Writes the inverse inertia of all bodies in the world frame; that of other solids stays 0."""
     for m in range(model.dynamic.shape[0]):
         if model.dynamic[m].is_body:
-            R, entry = workspace.solid[m].rotation, workspace.tensor[m].entry
+            R, inverse = workspace.solid[m].rotation, workspace.tensor[m].component
             j = model.dynamic[m].inverse_inertia
             for i in range(LANES):
                 jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
                 ax, ay, az = jx * R[0, i], jy * R[1, i], jz * R[2, i]
                 bx, by, bz = jx * R[3, i], jy * R[4, i], jz * R[5, i]
-                entry[0, i] = ax * R[0, i] + ay * R[1, i] + az * R[2, i]
-                entry[1, i] = bx * R[3, i] + by * R[4, i] + bz * R[5, i]
-                entry[2, i] = (
+                inverse[0, i] = ax * R[0, i] + ay * R[1, i] + az * R[2, i]
+                inverse[1, i] = bx * R[3, i] + by * R[4, i] + bz * R[5, i]
+                inverse[2, i] = (
                     jx * R[6, i] * R[6, i] + jy * R[7, i] * R[7, i] + jz * R[8, i] * R[8, i]
                 )
-                entry[3, i] = ax * R[3, i] + ay * R[4, i] + az * R[5, i]
-                entry[4, i] = ax * R[6, i] + ay * R[7, i] + az * R[8, i]
-                entry[5, i] = bx * R[6, i] + by * R[7, i] + bz * R[8, i]
+                inverse[3, i] = ax * R[3, i] + ay * R[4, i] + az * R[5, i]
+                inverse[4, i] = ax * R[6, i] + ay * R[7, i] + az * R[8, i]
+                inverse[5, i] = bx * R[6, i] + by * R[7, i] + bz * R[8, i]
 
 
 @stage
-def mobility(entry, i, ax, ay, az, ux, uy, uz, vx, vy, vz):
+def mobility(inverse, i, ax, ay, az, ux, uy, uz, vx, vy, vz):
     """1/kg: velocity along v, at arm a, that a unit impulse along u there causes by rotation."""
     px, py, pz = cross(ax, ay, az, ux, uy, uz)
     qx, qy, qz = cross(ax, ay, az, vx, vy, vz)
-    tx, ty, tz = tensor_times(entry, i, px, py, pz)
+    tx, ty, tz = tensor_times(inverse, i, px, py, pz)
     return qx * tx + qy * ty + qz * tz
 
 

@@ -1,14 +1,16 @@
 """The impulse law: contact impulses that keep solids from approaching.
 
 The force of a step is an impulse over its duration, found by sequential impulses (projected
-Gauss-Seidel): every contact is corrected in turn, once per substep and phase. Many short substeps
-converge faster than many sweeps of a long one. The impulses of the last substep are the first
-guess. With the relative velocity u at a point, half a step old, and the normal n out of the
-surface, a substep
+Gauss-Seidel): every contact is corrected in turn, once in phases 2 and 3 and until it converges in
+phase 1. Many short substeps converge faster than many sweeps of a long one. The impulses of the
+last substep are the first guess. With the relative velocity u at a point and the normal n out of
+the surface, a substep
 
-1. collides: instantaneous collisions with restitution, see `restitution.py`;
-2. relaxes: starting from the impulses of the last substep, it solves u n >= 0. This removes the
-   velocity that pushing overlapping bodies apart has given them;
+1. collides: instantaneous collisions with restitution at the present velocities, see
+   `restitution.py`;
+2. relaxes: from the velocities of half a step ago and the impulses of the last substep it solves
+   u n >= 0 for bodies that overlap, u n >= -separation/h for others. This removes the velocity
+   that pushing overlapping bodies apart has given them;
 3. applies the other forces and the first guess, then solves u n >= -separation/h for bodies that
    are apart and the soft contact of `sweep.py` for those that overlap.
 """
@@ -33,7 +35,11 @@ from physics.motion.vectors import rotated_back, tensor_times
 
 @cached_by_features
 def make_warm_start(features):
-    """Stage that applies the impulses of the last substep again, and notes what relaxing gave."""
+    """Stage that applies the impulses of the last substep again.
+
+    `extra_impulse` starts at minus those of the last substep. Adding what relaxing has made of them
+    leaves what relaxing gave.
+    """
     friction, resistance = features.friction, features.resistance
 
     @stage
@@ -114,7 +120,7 @@ def make_store_forces(features):
                     fz += pz
                     px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
                     remember(memory, TANGENT, i, updates, px, py, pz)
-                    anchor = point.anchor
+                    anchor = point.anchor  # remembered in place of the spring law's shear
                     sx, sy, sz = rotated_back(Q, i, anchor[0, i], anchor[1, i], anchor[2, i])
                     remember(memory, SHEAR, i, updates, sx, sy, sz)
                 if resistance:
@@ -138,9 +144,9 @@ def make_store_forces(features):
 
 @stage
 def apply_known_forces(model, workspace, h):
-    """Changes the velocities of all dynamic bodies by the forces that are already known."""
+    """Changes the velocities of all dynamic bodies by the forces of gravity and servos."""
     for m in range(model.dynamic.shape[0]):
-        solid, entry = workspace.solid[m], workspace.tensor[m].entry
+        solid, inverse = workspace.solid[m], workspace.tensor[m].component
         v, omega, F, T = solid.velocity, solid.angular_velocity, solid.force, solid.torque
         inverse_mass = model.dynamic[m].inverse_mass
         for i in range(LANES):
@@ -148,7 +154,7 @@ def apply_known_forces(model, workspace, h):
             v[0, i] += step * F[0, i]
             v[1, i] += step * F[1, i]
             v[2, i] += step * F[2, i]
-            tx, ty, tz = tensor_times(entry, i, T[0, i], T[1, i], T[2, i])
+            tx, ty, tz = tensor_times(inverse, i, T[0, i], T[1, i], T[2, i])
             omega[0, i] += h * tx
             omega[1, i] += h * ty
             omega[2, i] += h * tz
@@ -181,6 +187,7 @@ def make_impulses(features):
 
     @sequence
     def impulses(model, state, workspace, g, h, drifted, elapsed):
+        """Impulses act for `h` s; the last drift took `drifted` s, 0 in a refresh."""
         half_pairs, candidates = model.half_pair.shape[0], 0
         for k in range(half_pairs):
             candidates += workspace.half_pair[k].slots

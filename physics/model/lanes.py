@@ -1,19 +1,16 @@
 """Lane groups: sixteen worlds side by side, one per SIMD lane, as the kernels work on them.
 
 State keeps worlds one after another. A kernel loads LANES of them at a time into a `Workspace`,
-whose arrays have the lane as their last axis, advances them together and stores them. Every stage
-loops over the lanes without a branch, so LLVM turns the loop into vector instructions. Lanes never
-mix: a world's result does not depend on the worlds in the other lanes.
+whose arrays have the lane as their last axis, advances them together and stores them. What every
+substep does loops over the lanes without a branch, so LLVM turns the loop into vector instructions;
+what is rare goes lane by lane. Lanes never mix: a world's result does not depend on the worlds in
+the other lanes.
 """
-
-import numpy as np
 
 from physics.jit import LANES, stage
 from physics.model.features import Features, cached_by_features
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE
 from physics.model.tables import Model
-
-Array = np.ndarray
 
 
 @cached_by_features
@@ -78,7 +75,7 @@ def load(model, state, workspace, chosen, g):
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.dynamic.shape[0]):
             solid = workspace.solid[m]
-            solid.rotation_bound[i] = 0.0
+            solid.rotation_bound[i] = 0.0  # of the last drift, as the displacement: none yet
             for c in range(3):
                 solid.displacement[c, i] = 0.0
             if active:
@@ -127,12 +124,13 @@ def load(model, state, workspace, chosen, g):
 
 @stage
 def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
-    """Records a half-pair's normal force [LANES] N, and time and place of its first contact."""
+    """Records a half-pair's normal force [LANES] N, and its first contact."""
     half_pair, updates_memory = workspace.half_pair[k], workspace.lane[0].updates_memory
     first, previous = half_pair.first_touch, half_pair.previous_normal_force
     start, new = workspace.lane[0].start, 0
     for i in range(LANES):
         previous[i] = normal_force[i] if updates_memory[i] != 0 else previous[i]
+        # `first` is NaN before the first contact, so the comparison is false
         known = first[i] <= start[i] + elapsed
         nothing_new = (normal_force[i] <= 0.0) | known | (updates_memory[i] == 0)
         new += 0 if nothing_new else 1
@@ -142,7 +140,10 @@ def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
 
 @stage
 def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
-    """Records time and place of the first contact of a half-pair, in the lanes that have it now."""
+    """Records the first contact of a half-pair, in the lanes that have it now.
+
+    That is its time, and where the pair's first solid was: bodies come before drives and statics.
+    """
     first, updates_memory = workspace.half_pair[k].first_touch, workspace.lane[0].updates_memory
     half_pair, start = model.half_pair[k], workspace.lane[0].start
     position = workspace.solid[min(half_pair.owner, half_pair.surface)].position

@@ -86,7 +86,8 @@ CONTACT_ROW = np.dtype(
         ("normal_impulse", "f8", (LANES,)),  # N s
         ("tangential_impulse", "f8", (3, LANES)),  # N s
         ("twist", "f8", (3, LANES)),  # N m s against rolling and spinning
-        # given in this step beyond the impulses above: by the relaxation sweep
+        # given in this step beyond the impulses above: by the relaxation sweep, and in a refresh
+        # by collisions
         ("extra_impulse", "f8", (3, LANES)),  # N s
         ("extra_angular_impulse", "f8", (3, LANES)),  # N m s
         ("anchor", "f8", (3, LANES)),  # m, creep since the point came to stick
@@ -99,7 +100,7 @@ CONTACT_ROW = np.dtype(
 )
 
 # one row per solid
-TENSOR = np.dtype([("entry", "f8", (6, LANES))], align=True)  # 1/(kg m^2): xx yy zz xy xz yz
+TENSOR = np.dtype([("component", "f8", (6, LANES))], align=True)  # 1/(kg m^2): xx yy zz xy xz yz
 
 # a single row
 LANE = np.dtype(

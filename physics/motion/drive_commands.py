@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.jit import SOURCES, entry
+from physics.code_cache import SOURCES
+from physics.jit import entry
 
 Array = np.ndarray
 

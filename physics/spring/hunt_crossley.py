@@ -2,36 +2,38 @@
 
 `hunt_crossley` (default): f = k d (1 + a d'/v), with penetration d, its rate d' and the impact
 speed v (Hunt and Crossley 1975). Damping vanishes with the penetration, so the force has no jump at
-first touch. From m d'' = -f and an impact at speed v, integrating v dv/dd gives the restitution e:
+first touch. With u = d', integrating m u du/dd = -f from u = v to the end of the
+contact gives the restitution e:
 
     a (1 + e) = ln((1 + a) / (1 - a e)),
 
-which `normal_damping.damping_coefficient` solves for a. In discrete time the law needs two details.
+which `physics.model.normal_damping` solves for a. In discrete time the law needs two details.
 
-1. The rate relaxes within the step. Let u be the half-step rate before it, c = k d a / v,
+1. The rate relaxes within the step. Let u be the rate at which it starts, c = k d a / v,
    x = c h / m, and L the load that presses the contact from outside. Then m u' = L - k d - c u has
    the mean force phi (k d + c u) + (1 - phi) L with phi = (1 - exp(-x)) / x. Replacing exp(-x) by
    1/(1 + x + x^2/2) keeps second order, and damping of any strength removes at most the whole
    approach speed.
 
-   L follows from the last step: L = f + m (u - u_before) / h, limited to 0 ... k d. Here f is that
-   of a whole face, while a face, an edge and a corner carry different weights W of the pair's
-   stiffness; so m is replaced by m / W, with the weight W that was in contact in the last step.
-   With the pair's normal force F in that step, F / W is the mean of f over the samples in contact.
+   L follows from the last step: L = f + m (u - u_before) / h, limited to 0 ... k d. Here f is what
+   the sample's force would be if it had the whole stiffness of the pair. The samples in contact
+   have a part W of it, so m is replaced by m / W, with the W of the last step. With the pair's
+   normal force F in that step, F / W is the mean of f over the samples in contact.
    Where a cube lands on its corner, the samples around it have just touched and carry little yet.
    If all counted alike, the corner's load would be overestimated and it would rebound a tenth too
    fast. So a sample whose f exceeds `_OVERLOADED` times the mean counts by its force, with f / F in
    place of 1 / W. So does a sample below the mean whose approach slows, u < u_before: it can't lose
-   more load than it carries. Under either rule alone the loads of all samples sum to
-   F + m (u - u_before) / h; where both apply, L is slightly too high.
+   more load than it carries. If all samples counted alike, or all by their
+   force, their loads would sum to F + m (u - u_before) / h. If some count one way and some the
+   other, the sum is slightly higher.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
    is (d + b)^2 / (4 b). So restitution does not depend on the phase of the step at first touch
-   (docs/decisions).
+   (docs/decisions/0007-normal-force.md).
 
-The impact speed of a lasting contact is reset whenever it turns from separating to approaching,
-with a lower bound at rest, so that a body that has landed is damped by its present motion.
+The impact speed is reset whenever a contact turns from separating to approaching, so that a body
+that has landed is damped by its present motion. `floor` is its least value.
 
 `dashpot`: f = max(0, k d + c d'), for comparison with other codes. It jumps at first touch.
 """
@@ -70,7 +72,8 @@ def hunt_crossley_force(
         k: N/m.
         a: damping coefficient.
         floor: m/s, lower bound of the impact speed.
-        inverse_mass: 1/kg of the pair; of this point if it is the only sample.
+        inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
+            of the effective mass at its contact point, to which rotation contributes.
         h: s.
         load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
@@ -80,13 +83,13 @@ def hunt_crossley_force(
 
     Returns:
         Force in N, impact speed to remember in m/s, and persistence: 1 for a contact that lasts,
-        falling to 0 with the speed of a collision.
+        inversely proportional to the impact speed for a faster one.
     """
     b = 0.5 * h * abs(approach) + 1e-30
-    s = penetration + b
+    reach = penetration + b
     deep = penetration > b
     # mean penetration S/D, kept as a fraction: the whole force then takes one division
-    S = penetration if deep else s * s
+    S = penetration if deep else reach * reach
     D = 1.0 if deep else 4.0 * b
     turned_around = (impact_speed < 0.0) & (approach > 0.0)
     speed = 0.0 if turned_around else abs(impact_speed)
@@ -96,23 +99,24 @@ def hunt_crossley_force(
     rate = load_rate * (relative_force if by_force else 1.0)
     load = previous_force + rate * change if impact_speed != 0.0 else 0.0
     load = min(max(load, 0.0), k * max(penetration, 0.0))
-    # a loaded contact is at rest under its load as a body is under its weight
-    loaded = load * math.sqrt(inverse_mass / k)
-    slowest = max(speed, a * loaded)
+    # `floor` is a g / omega, for a body at rest under its weight; here it rests under its load
+    load_speed = load * math.sqrt(inverse_mass / k)
+    v = max(speed, a * load_speed)
+    # both a d / v and x are kept as fractions of the divisor r
+    r = v * D
     y = a * S
     x = h * k * inverse_mass * y
-    r = slowest * D
-    numerator = k * (slowest * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * load
+    numerator = k * (v * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * load
     divisor = r * r + r * x + 0.5 * x * x
-    inverse = 1.0 / (divisor * slowest)  # for both quotients: divisions are the expensive part
-    force = numerator * slowest * inverse
-    # a sample that overlaps only in the mean over the drift, and separates already, never touched
-    touching = (s > 0.0) & ((impact_speed != 0.0) | (approach > 0.0) | (penetration > 0.0))
+    inverse = 1.0 / (divisor * v)  # for both quotients: divisions are the expensive part
+    force = numerator * v * inverse
+    # a sample that is apart, in reach only through b, and separates already, never touched
+    touching = (reach > 0.0) & ((impact_speed != 0.0) | (approach > 0.0) | (penetration > 0.0))
     force = force if touching & (force > 0.0) else 0.0
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
-    # a contact lasts if it is no faster than its load would make it in a step or two
-    calm = max(floor, max(a, _CALM) * loaded)
+    # a contact lasts if it is no faster than its load would make it within max(a, _CALM) / omega
+    calm = max(floor, max(a, _CALM) * load_speed)
     return force, impact_speed, min(1.0, calm * divisor * inverse)
 
 
@@ -131,7 +135,11 @@ def dashpot_force(
     previous_force,
     previous_approach,
 ):
-    """As `hunt_crossley_force`, by the clamped linear dashpot; damping is exact over a step."""
+    """As `hunt_crossley_force`, by the clamped linear dashpot.
+
+    Its damping force is the mean over a step in which nothing else acts. It ignores `floor`, the
+    load and what contacts remember.
+    """
     rate = 2.0 * zeta * math.sqrt(k * inverse_mass)
     x = rate * h
     damped = rate / inverse_mass * approach * (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.jit import SOURCES, entry, stage
+from physics.code_cache import SOURCES
+from physics.jit import entry, stage
 
 Array = np.ndarray
 

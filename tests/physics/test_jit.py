@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics import World, jit
+from physics import World, code_cache
 from physics.reference import scenes
 
 PACKAGE = Path(physics.__file__).parent
@@ -32,6 +32,14 @@ misses = sum(stats.cache_misses.values())
 assert sum(line.startswith("compiling kernel 'advance'") for line in lines) == misses
 assert sum(line.startswith("compiled kernel 'advance' in") for line in lines) == misses
 print(sum(stats.cache_hits.values()), misses, world.position[0, 0, 2])
+"""
+
+# another kernel, which has most stages in common with that of a fall
+LAND = """
+from physics import Body, Ground, Scene, Sphere, World
+world = World(Scene([Body(Sphere(0.1), position=(0.0, 0.0, 0.11))], statics=[Ground()]))
+world.advance(0.3)
+print(*[repr(float(x)) for x in world.position.ravel()])
 """
 
 PUSH = """
@@ -66,6 +74,14 @@ def run(program, cache, root=ROOT, **variables):
     return [float(x) for x in done.stdout.split()]
 
 
+def run_here(program):
+    """The same in this process, which shares kernels with the other tests."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(program, {})
+    return [float(x) for x in printed.getvalue().split()]
+
+
 @pytest.fixture(scope="module")
 def copied(tmp_path_factory):
     """A copy of the package and a cache that has seen it once."""
@@ -84,6 +100,31 @@ def test_a_second_process_compiles_nothing(copied):
     assert {p: p.stat().st_mtime_ns for p in cache.rglob("*.nb*")} == files
 
 
+def test_a_second_kernel_takes_its_common_stages_from_the_disk(copied):
+    root, cache, _ = copied
+    before = {p: p.stat().st_mtime_ns for p in cache.rglob("*.stage")}
+    assert len(before) > 10
+    landed = run(LAND, cache, root)
+    after = {p: p.stat().st_mtime_ns for p in cache.rglob("*.stage")}
+    assert len(after) > len(before)
+    assert {p: after[p] for p in before} == before
+    assert landed == run_here(LAND)
+
+
+def test_what_a_stage_closes_over_tells_it_from_others():
+    def make(value):
+        return lambda: value
+
+    identities = [
+        repr(code_cache._identity(make(value)))
+        for value in (1, 2, 1.0, True, None, "1", (1, 2), np.dtype("f8"), make(1), make(2))
+    ]
+    assert len(set(identities)) == len(identities)
+    assert code_cache._identity(make((1, make(2)))) == code_cache._identity(make((1, make(2))))
+    with pytest.raises(TypeError, match=r"closure of a stage holds \[1\], which is a list"):
+        code_cache._identity(make([1]))
+
+
 def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
     root, cache, (_, _, height) = copied
     path = root / "physics" / "motion" / "gravity.py"
@@ -98,12 +139,12 @@ def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
 
 def test_an_edit_of_any_file_changes_the_key_of_the_cache(tmp_path, monkeypatch):
     shutil.copytree(PACKAGE, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(jit, "_PACKAGE", tmp_path / "physics")
-    keys = {jit._hash_sources()}
+    monkeypatch.setattr(code_cache, "_PACKAGE", tmp_path / "physics")
+    keys = {code_cache._hash_sources()}
     files = sorted((tmp_path / "physics").rglob("*.py"))
     for path in files:
         path.write_text(path.read_text() + "# edited\n")
-        keys.add(jit._hash_sources())
+        keys.add(code_cache._hash_sources())
     assert len(keys) == len(files) + 1
 
 
@@ -121,12 +162,12 @@ def test_every_entry_point_carries_the_key_of_the_cache():
 
     function = make_advance(world.features).compiled.py_func
     cells = [c.cell_contents for c in function.__closure__]
-    assert jit.SOURCES in [c for c in cells if isinstance(c, int)]
+    assert code_cache.SOURCES in [c for c in cells if isinstance(c, int)]
 
 
-def test_only_two_files_know_numba():
+def test_only_three_files_know_numba():
     for path in PACKAGE.rglob("*.py"):
-        if path.name not in ("jit.py", "linking.py"):
+        if path.name not in ("code_cache.py", "jit.py", "linking.py"):
             assert "numba" not in "".join(
                 line for line in path.read_text().splitlines(True) if "import" in line
             ), path
@@ -138,9 +179,6 @@ def test_without_compilation_the_same_stages_give_the_same_numbers(tmp_path, per
         pytest.skip("half a minute in plain Python; see make stress")
     script = PUSH.format(per_world=per_world)
     plain = run(script, tmp_path, NUMBA_DISABLE_JIT="1")
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(script, {})  # in this process, which shares kernels with the other tests
-    compiled = [float(x) for x in printed.getvalue().split()]
+    compiled = run_here(script)
     assert len(plain) == len(compiled) > 20
     np.testing.assert_allclose(plain, compiled, rtol=1e-9, atol=1e-9)

@@ -14,6 +14,7 @@ from physics import (
     Box,
     Drive,
     Fidelity,
+    Ground,
     Scene,
     SimulationDiverged,
     Sphere,
@@ -23,7 +24,7 @@ from physics.jit import LANES
 from physics.model.contact_memory import contact_memory
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
 from physics.reference import scenes
-from physics.reference.scenes import BALL, GRAVITY, settled
+from physics.reference.scenes import BALL, CUBE, GRAVITY, settled
 
 
 def thrown(count, threads=None, order=slice(None)):
@@ -128,7 +129,9 @@ def test_without_a_stiffness_no_step_is_too_long():
 
 
 def test_a_servo_that_the_step_cannot_carry_is_refused():
-    scene = Scene([], drives=[Drive(BALL, 0.1, 5.0, frequency=900.0)])
+    # body and ground, far away, for a kernel that other scenes have, too
+    body, ground = Body(CUBE, position=(0, 0, 9.0)), Ground(height=-9.0)
+    scene = Scene([body], [ground], [Drive(BALL, 0.1, 5.0, frequency=900.0)])
     with pytest.raises(
         ValueError, match=r"Drive\.frequency 900 .* drive 0 .*safe step is (\S+) s"
     ) as e:

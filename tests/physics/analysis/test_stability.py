@@ -17,6 +17,7 @@ from physics import (
     Scene,
     SimulationDiverged,
     Sphere,
+    Static,
     World,
 )
 from physics.reference import scenes
@@ -42,7 +43,8 @@ def scene(kind, restitution):
             Body(shape, mass=mass, position=(0, 0, z), orientation=turn, material=material)
             for shape, mass, z in bodies
         ],
-        [Ground(material)],
+        # the box is far away, for a kernel that other scenes have, too
+        [Ground(material), Static(cube, (0, 0, 9.0), material=material)],
     )
 
 

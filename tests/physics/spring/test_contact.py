@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -208,7 +209,8 @@ def test_a_block_on_a_steep_incline_slides_at_g_sin_minus_mu_cos(degrees):
 
 
 def test_without_friction_a_block_slides_on_for_ever():
-    world = settled(scenes.block_on_ground(friction=0.0))
+    tool = Drive(Sphere(0.02), 0.05, 5.0, (0, 0, 9.0))  # for a kernel that other scenes have, too
+    world = settled(replace(scenes.block_on_ground(friction=0.0), drives=[tool]))
     world.set_state(linear_velocity=(1.0, 0.5, 0.0))
     world.advance(5.0)
     np.testing.assert_allclose(world.linear_velocity[0, 0, :2], (1.0, 0.5), rtol=1e-12)
@@ -309,7 +311,8 @@ def test_a_small_fast_ball_rebounds_from_a_face_as_a_large_slow_one(restitution,
         material = Material(restitution=restitution)
         ball = Body(Sphere(radius), mass=0.1, position=(0, 0, radius + 0.052), material=material)
         block = Static(Box((0.2, 0.2, 0.05)), material=material)
-        scene = Scene([ball], [block], gravity=(0, 0, 0))
+        ground = Ground(height=-9.0)  # for a kernel that other scenes have, too
+        scene = Scene([ball], [block, ground], gravity=(0, 0, 0))
         world = World(scene, fidelity)
         world.set_state(linear_velocity=(0, 0, -speed))
         world.advance(0.2)
