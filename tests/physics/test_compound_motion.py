@@ -39,7 +39,7 @@ def scene(shape, body=None, ball=None, gravity=(0.0, 0.0, -9.81), friction=0.5, 
     other = BLOCK if ball is None else Sphere(0.015)
     given = {"position": FAR, "material": rough} | ({} if ball is None else ball)
     ground = Ground(Material(friction=0.5, restitution=restitution))
-    bystanders = isinstance(shape, Compound)
+    bystanders = shape in (T, HALVES)
     return Scene(
         [Body(shape, mass=MASS, material=rough, **place), Body(other, mass=BALL, **given)],
         [ground, POST] if bystanders else [ground],
