@@ -7,8 +7,8 @@ miss. (A hash that ignores comments would cost every process 80 ms when it start
 2 ms.)
 
 Most of an entry's compile time goes into its stages, and most of these it has in common with other
-entries. They are cached here, as optimised bitcode that callers link. So scenes that differ, tests
-in several processes and the workers of a vector environment compile a common stage once.
+entries. They are cached here, as optimised bitcode that callers link. So a scene whose
+kernel is new compiles only what no scene before it had, in whatever process.
 """
 
 import hashlib
@@ -21,6 +21,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
 from numba.core.caching import FunctionCache
@@ -37,7 +38,9 @@ def _hash_sources() -> int:
 
 
 SOURCES: int = _hash_sources()
-_MADE_BY = (SOURCES, numba.__version__, np.__version__, platform.python_version())
+_MADE_BY = (
+    SOURCES, numba.__version__, llvmlite.__version__, np.__version__, platform.python_version(),
+)  # fmt: skip
 
 
 def is_cacheable(stage: Any) -> bool:

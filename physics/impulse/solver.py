@@ -1,10 +1,10 @@
 """The impulse law: contact impulses that keep solids from approaching.
 
 The force of a step is an impulse over its duration, found by sequential impulses (projected
-Gauss-Seidel): every contact is corrected in turn, once in phases 2 and 3 and until it converges in
-phase 1. Many short substeps converge faster than many sweeps of a long one. The impulses of the
-last substep are the first guess. With the relative velocity u at a point and the normal n out of
-the surface, a substep
+Gauss-Seidel): every contact is corrected in turn, once in steps 2 and 3 below and until it
+converges in step 1. Many short substeps converge faster than many sweeps of a long one. The
+impulses of the last substep, relaxed, are the first guess. With the relative velocity u at a point
+and the normal n out of the surface, a substep
 
 1. collides: instantaneous collisions with restitution at the present velocities, see
    `restitution.py`;
@@ -35,10 +35,10 @@ from physics.motion.vectors import rotated_back, tensor_times
 
 @cached_by_features
 def make_warm_start(features):
-    """Stage that applies the impulses of the last substep again.
+    """Stage that applies the first guess: the impulses of the last substep, relaxed.
 
-    `extra_impulse` starts at minus those of the last substep. Adding what relaxing has made of them
-    leaves what relaxing gave.
+    `extra_impulse` was minus the impulses of the last substep. With the relaxed ones added it is
+    what relaxing itself gave, which belongs to the force of this step, too.
     """
     friction, resistance = features.friction, features.resistance
 
@@ -47,6 +47,7 @@ def make_warm_start(features):
         points = pair.points
         for n in range(points.shape[0]):
             point = points[n]
+            # `twist`: angular impulse against rolling and spinning
             normal, tangential, twist = point.normal, point.tangential_impulse, point.twist
             extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
             for i in range(LANES):
@@ -120,7 +121,7 @@ def make_store_forces(features):
                     fz += pz
                     px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
                     remember(memory, TANGENT, i, updates, px, py, pz)
-                    anchor = point.anchor  # remembered in place of the spring law's shear
+                    anchor = point.anchor  # creep, m; remembered as the spring law's shear is
                     sx, sy, sz = rotated_back(Q, i, anchor[0, i], anchor[1, i], anchor[2, i])
                     remember(memory, SHEAR, i, updates, sx, sy, sz)
                 if resistance:

@@ -1,6 +1,6 @@
 """Lane groups: sixteen worlds side by side, one per SIMD lane, as the kernels work on them.
 
-State keeps worlds one after another. A kernel loads LANES of them at a time into a `Workspace`,
+State keeps bodies world by world. A kernel loads LANES of them at a time into a `Workspace`,
 whose arrays have the lane as their last axis, advances them together and stores them. What every
 substep does loops over the lanes without a branch, so LLVM turns the loop into vector instructions;
 what is rare goes lane by lane. Lanes never mix: a world's result does not depend on the worlds in
@@ -75,7 +75,8 @@ def load(model, state, workspace, chosen, g):
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.dynamic.shape[0]):
             solid = workspace.solid[m]
-            solid.rotation_bound[i] = 0.0  # of the last drift, as the displacement: none yet
+            # how far the last drift moved the solid, for the broadphase: there was none yet
+            solid.rotation_bound[i] = 0.0
             for c in range(3):
                 solid.displacement[c, i] = 0.0
             if active:
@@ -86,7 +87,7 @@ def load(model, state, workspace, chosen, g):
                     solid.angular_momentum[c, i] = row.angular_momentum[c]
                     solid.reference[c, i] = row.reference[c]
                     solid.reference_velocity[c, i] = row.reference_velocity[c]
-                solid.reference_time[i] = row.reference_time
+                solid.reference_time[i] = row.reference_time  # for which the set point still moves
                 for c in range(4):
                     solid.orientation[c, i] = row.orientation[c]
                 load_forces(state, workspace, g, m, i)
@@ -157,7 +158,10 @@ def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
 
 @stage
 def end_refresh(model, state, workspace, g):
-    """Restores the forces of lanes that needed no refresh; all lanes update their memory again."""
+    """Restores the forces of lanes that needed no refresh, which runs over the whole group.
+
+    From now on all active lanes update what contacts remember, see `broadphase.make_forget`.
+    """
     lane = workspace.lane[0]
     for i in range(LANES):
         lane.updates_memory[i] = lane.active[i]

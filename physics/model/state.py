@@ -1,4 +1,4 @@
-"""State: what changes, as arrays with a leading world axis."""
+"""State: what changes, as arrays by world; contact candidates by lane group."""
 
 from typing import NamedTuple
 

@@ -20,12 +20,11 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
    have a part W of it, so m is replaced by m / W, with the W of the last step. With the pair's
    normal force F in that step, F / W is the mean of f over the samples in contact.
    Where a cube lands on its corner, the samples around it have just touched and carry little yet.
-   If all counted alike, the corner's load would be overestimated and it would rebound a tenth too
-   fast. So a sample whose f exceeds `_OVERLOADED` times the mean counts by its force, with f / F in
-   place of 1 / W. So does a sample below the mean whose approach slows, u < u_before: it can't lose
-   more load than it carries. If all samples counted alike, or all by their
-   force, their loads would sum to F + m (u - u_before) / h. If some count one way and some the
-   other, the sum is slightly higher.
+   With the factor 1 / W for all, the corner's load would be overestimated and it would rebound a
+   tenth too fast. So a sample whose f exceeds `_OVERLOADED` times the mean has the factor f / F
+   instead. So has a sample below the mean whose approach slows, u < u_before: it can't lose more
+   load than it carries. With either factor for all samples, the sum of weight times L would be
+   F + m (u - u_before) / h; with both it is slightly higher.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
@@ -35,14 +34,15 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
 The impact speed is reset whenever a contact turns from separating to approaching, so that a body
 that has landed is damped by its present motion. `floor` is its least value.
 
-`dashpot`: f = max(0, k d + c d'), for comparison with other codes. It jumps at first touch.
+`dashpot`: f = max(0, k d + c d') with a constant c, for comparison with other codes. It jumps at
+first touch.
 """
 
 import math
 
 from physics.jit import stage
 
-# speeds below this multiple of (load / m) / omega don't count as a collision
+# a contact lasts up to this multiple of (load / m) / omega, or more, see the end
 _CALM = 2.0
 # multiple of the mean force from which a sample counts by its own force, see 1. Forces within a
 # leaning tower differ by less; if the rule applied there it would act as a softening spring
@@ -99,10 +99,10 @@ def hunt_crossley_force(
     rate = load_rate * (relative_force if by_force else 1.0)
     load = previous_force + rate * change if impact_speed != 0.0 else 0.0
     load = min(max(load, 0.0), k * max(penetration, 0.0))
-    # `floor` is a g / omega, for a body at rest under its weight; here it rests under its load
+    # `floor`, a g / omega, supposes that the load is the weight; this is the same for the load
     load_speed = load * math.sqrt(inverse_mass / k)
     v = max(speed, a * load_speed)
-    # both a d / v and x are kept as fractions of the divisor r
+    # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
     x = h * k * inverse_mass * y
@@ -115,7 +115,7 @@ def hunt_crossley_force(
     force = force if touching & (force > 0.0) else 0.0
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
-    # a contact lasts if it is no faster than its load would make it within max(a, _CALM) / omega
+    # a contact lasts up to the speed that its load gives in the time max(a, _CALM) / omega
     calm = max(floor, max(a, _CALM) * load_speed)
     return force, impact_speed, min(1.0, calm * divisor * inverse)
 
