@@ -79,10 +79,10 @@ class StageFile:
         self._path = folder / f"{function.__name__}.{self.digest}.stage"
 
     def load(self) -> Any | None:
-        """What was saved; None if nothing was, or by other sources or versions."""
+        """What was saved; None if nothing was, or by other sources or versions, or is damaged."""
         try:
             made_by, content = pickle.loads(zlib.decompress(self._path.read_bytes()))
-        except FileNotFoundError:
+        except (OSError, EOFError, zlib.error, pickle.UnpicklingError):
             return None
         return content if made_by == _MADE_BY else None
 

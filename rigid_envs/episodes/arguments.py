@@ -46,6 +46,7 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
         ValueError: there is no such task, or its constructor raised this error.
     """
     known: list[str] = []
+    others = list(others)
     if not isinstance(task, Task):
         if not (isinstance(task, type) and issubclass(task, Task)):
             task = TASKS[choice("task", task, TASKS)]
@@ -57,11 +58,13 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
         if argument in _WHERE:
             raise TypeError(f"argument {argument!r} {_WHERE[argument]}")
         near = get_close_matches(argument, [*known, *others], 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        accepted = f"{name} accepts {known or 'no arguments'}"
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        accepted = f"{name} accepts {known or 'no arguments of its own'}"
+        if others:
+            accepted += f", every task accepts {sorted(others)}"
         if isinstance(task, Task):
             accepted = f"task is a {name} object, which accepts no further arguments"
-        raise TypeError(f"unknown argument {argument!r}: {accepted}{hint}")
+        raise TypeError(f"unknown argument {argument!r}: {hint}{accepted}")
     return task if isinstance(task, Task) else task(**arguments)
 
 

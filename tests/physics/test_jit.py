@@ -97,6 +97,24 @@ def test_a_second_kernel_takes_its_common_stages_from_the_disk(copied):
     assert {p: after[p] for p in before} == before
 
 
+def test_a_damaged_file_of_a_stage_counts_as_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(code_cache.FunctionCache, "cache_path", str(tmp_path))
+    file = code_cache.StageFile(run, "types", "target")
+    assert file.load() is None
+    file.save("content")
+    assert code_cache.StageFile(run, "types", "target").load() == "content"
+    assert code_cache.StageFile(run, "other types", "target").load() is None
+    (path,) = tmp_path.iterdir()
+    for broken in (path.read_bytes()[:-9], b"", b"text"):
+        path.write_bytes(broken)
+        assert file.load() is None
+    monkeypatch.setattr(code_cache, "_MADE_BY", "other sources")
+    file.save("content")
+    monkeypatch.undo()
+    monkeypatch.setattr(code_cache.FunctionCache, "cache_path", str(tmp_path))
+    assert file.load() is None
+
+
 def test_what_a_stage_closes_over_tells_it_from_others():
     def make(value):
         return lambda: value

@@ -48,10 +48,11 @@ def test_a_single_argument_raises_for_vectors(name):
         (
             STACK,
             "bloks",
-            "Stack accepts ['blocks', 'partial_tower_start_prob', 'near_grasp_start_prob']; "
-            "did you mean 'blocks'?",
+            "did you mean 'blocks'? "
+            "Stack accepts ['blocks', 'partial_tower_start_prob', 'near_grasp_start_prob'], "
+            "every task accepts ['",
         ),
-        (PUSH, "blocks", "Push accepts ['target_yaw', 'obstacles', 'block']"),
+        (PUSH, "blocks", "Push accepts ['target_yaw', 'obstacles', 'block'], every"),
         (PUSH, "count", "unknown argument 'count'"),  # an argument of the runner only
     ],
 )
