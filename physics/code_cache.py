@@ -8,7 +8,9 @@ miss. (A hash that ignores comments would cost every process 80 ms when it start
 
 Most of an entry's compile time goes into its stages, and most of these it has in common with other
 entries. They are cached here, as optimised bitcode that callers link. So a scene whose
-kernel is new compiles only what no scene before it had, in whatever process.
+kernel is new compiles its entry, its sequences and those stages that no scene before it had.
+
+An edit leaves files behind that nothing reads any more; `make clean` removes them.
 """
 
 import hashlib
@@ -17,9 +19,11 @@ import pickle
 import platform
 import zlib
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
+from uuid import uuid4
 
 import llvmlite
 import numba
@@ -38,9 +42,15 @@ def _hash_sources() -> int:
 
 
 SOURCES: int = _hash_sources()
-_MADE_BY = (
-    SOURCES, numba.__version__, llvmlite.__version__, np.__version__, platform.python_version(),
+
+# settings of numba, by environment variables, that change the code
+_SETTINGS = (
+    "OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "USING_SVML",
 )  # fmt: skip
+_MADE_BY = repr((
+    SOURCES, numba.__version__, llvmlite.__version__, np.__version__, platform.python_version(),
+    [getattr(numba.config, name, None) for name in _SETTINGS],
+)).encode()  # fmt: skip
 
 
 def is_cacheable(stage: Any) -> bool:
@@ -51,8 +61,11 @@ def is_cacheable(stage: Any) -> bool:
 def _identity(value: Any) -> Any:
     """What tells a stage, or a value in its closure, from others: the same in every process."""
     if isinstance(value, FunctionType):
+        code = value.__code__
+        constants = [repr(x) for x in code.co_consts if not isinstance(x, CodeType)]
         cells = [_identity(cell.cell_contents) for cell in value.__closure__ or ()]
-        return value.__module__, value.__qualname__, value.__code__.co_firstlineno, cells
+        name = (value.__module__, value.__qualname__, _identity(value.__defaults__))
+        return name, code.co_code, constants, code.co_names, code.co_freevars, cells
     if isinstance(value, tuple):
         return [_identity(part) for part in value]
     if value is None or isinstance(value, int | float | str | np.dtype):
@@ -63,33 +76,51 @@ def _identity(value: Any) -> Any:
     )
 
 
+@cache
+def _folder() -> Path:
+    """Where numba keeps the compiled code of this package."""
+    return Path(FunctionCache(_identity).cache_path)
+
+
 class StageFile:
     """The file of a stage that is compiled for given types of arguments.
 
+    It starts with a hash of itself and of what made it, so that nothing is read that other sources
+    or versions wrote, or that is damaged.
+
     Attributes:
-        digest: of everything that the compiled stage depends on but sources and versions, which
-            the file itself states: an edit replaces it.
+        digest: of everything that the compiled stage depends on but sources, versions and settings.
     """
 
     def __init__(self, function: Any, types: Any, target: Any) -> None:
         """`target`: what numba's code generator says of the machine."""
         key = repr((_identity(function), types, target))
         self.digest = hashlib.sha256(key.encode()).hexdigest()[:24]
-        folder = Path(FunctionCache(_identity).cache_path)  # numba's choice for this package
-        self._path = folder / f"{function.__name__}.{self.digest}.stage"
+        self._path = _folder() / f"{function.__name__.strip('<>')}.{self.digest}.stage"
 
     def load(self) -> Any | None:
         """What was saved; None if nothing was, or by other sources or versions, or is damaged."""
         try:
-            made_by, content = pickle.loads(zlib.decompress(self._path.read_bytes()))
-        except (OSError, EOFError, zlib.error, pickle.UnpicklingError):
+            data = self._path.read_bytes()
+        except OSError:
             return None
-        return content if made_by == _MADE_BY else None
+        hashed, body = data[:_HASH_SIZE], data[_HASH_SIZE:]
+        return pickle.loads(zlib.decompress(body)) if hashed == _hash(body) else None
 
     def save(self, content: Any) -> None:
         """Writes the file at once: another process sees all of it or nothing."""
-        unfinished = self._path.with_suffix(f".{os.getpid()}")
+        body = zlib.compress(pickle.dumps(content), 1)
+        unfinished = self._path.with_suffix(f".{uuid4().hex}")
         with suppress(OSError):  # without a cache all works, only slower
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            unfinished.write_bytes(zlib.compress(pickle.dumps((_MADE_BY, content)), 1))
-            os.replace(unfinished, self._path)
+            try:
+                unfinished.write_bytes(_hash(body) + body)
+                os.replace(unfinished, self._path)
+            finally:
+                unfinished.unlink(missing_ok=True)
+
+
+def _hash(body: bytes) -> bytes:
+    return hashlib.sha256(_MADE_BY + body).digest()
+
+
+_HASH_SIZE = len(_hash(b""))

@@ -164,7 +164,7 @@ class StagePipeline(EntryPipeline):
     """For a function that only compiled functions call: it is optimised, not emitted, and cached.
 
     Running numbers start anew in every process, so symbols of a stage are named by its digest. All
-    that a stage calls is inlined, so its bitcode defines nothing else.
+    that a stage calls is inlined, so its bitcode defines no other function.
     """
 
     library = _LinkedLibrary
@@ -189,7 +189,8 @@ class StagePipeline(EntryPipeline):
         described.typemap = described.calltypes = None  # large, and only for the lowering
         module = library._final_module
         # a function that wasn't inlined would keep its running number, which isn't unique on disk
-        if sum(not function.is_declaration for function in module.functions) == 1:
+        defined = sum(not function.is_declaration for function in module.functions)
+        if defined == 1 and not library.has_dynamic_globals:  # these are addresses
             file.save((library.name, module.as_bitcode(), described, result.signature))
         return result
 

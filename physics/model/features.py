@@ -2,7 +2,7 @@
 
 Counts, sizes and material values are not features. Scenes that differ only in these share their
 kernels, so a parameter sweep compiles nothing. Scenes whose features differ share the stages that
-don't depend on the difference, within a process.
+don't depend on the difference.
 """
 
 from collections.abc import Callable
