@@ -99,11 +99,11 @@ def test_a_second_kernel_takes_its_common_stages_from_the_disk(copied):
 
 def test_a_damaged_file_of_a_stage_counts_as_none(tmp_path, monkeypatch):
     monkeypatch.setattr(code_cache, "_folder", lambda: tmp_path)
-    file = code_cache.StageFile(run, "types", "target")
+    file = code_cache.StageFile(code_cache.is_cacheable, "types", "target")
     assert file.load() is None
     file.save("content")
-    assert code_cache.StageFile(run, "types", "target").load() == "content"
-    assert code_cache.StageFile(run, "other types", "target").load() is None
+    assert code_cache.StageFile(code_cache.is_cacheable, "types", "target").load() == "content"
+    assert code_cache.StageFile(code_cache.is_cacheable, "other types", "target").load() is None
     (path,) = tmp_path.iterdir()
     for broken in (path.read_bytes()[:-9], b"", b"text"):
         path.write_bytes(broken)
