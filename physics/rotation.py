@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from physics.jit import stage
+from physics.compiler.jit import stage
 
 Array = np.ndarray
 

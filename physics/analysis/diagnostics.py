@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.code_cache import SOURCES
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import LANES, large_entry
 from physics.impulse.contact_rows import make_contact_rows
-from physics.jit import LANES, large_entry
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, State

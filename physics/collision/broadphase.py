@@ -12,7 +12,7 @@ are computed right after it.
 from physics.collision.candidate_list import make_clear, make_search
 from physics.collision.manifold import make_manifold_reduction
 from physics.collision.relative_frame import relative_pose
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.features import cached_by_features
 from physics.model.lanes import count_slots
 from physics.scene.shapes import PLANE

@@ -12,7 +12,7 @@ from physics.collision.distances import core_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import PARTICLES, PLANE

@@ -7,7 +7,7 @@ box does not leave through it, see `physics.scene.internal_faces`.
 
 import math
 
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated
 

@@ -8,7 +8,7 @@ sample's lowest point: friction then acts at the arm that a rigid body has (docs
 import math
 
 from physics.collision.distances import box_distance, capsule_distance, sphere_distance
-from physics.jit import stage
+from physics.compiler.jit import stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE

@@ -6,7 +6,7 @@ vectorise the loops around them, and return (distance m, normal x y z); that of 
 
 import math
 
-from physics.jit import stage
+from physics.compiler.jit import stage
 from physics.scene.shapes import BOX, CAPSULE, PLANE
 
 

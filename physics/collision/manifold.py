@@ -8,7 +8,7 @@ until then another sample can get as deep as the skin is wide, if a body rotates
 
 import math
 
-from physics.jit import at, stage
+from physics.compiler.jit import at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.motion.vectors import cross, rotated

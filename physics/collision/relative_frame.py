@@ -5,7 +5,7 @@ force and torque on the owner in that frame. The frame of a plane is the world f
 compound has a frame.
 """
 
-from physics.jit import LANES, stage
+from physics.compiler.jit import LANES, stage
 from physics.motion.vectors import rotated_back
 
 

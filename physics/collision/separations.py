@@ -2,7 +2,7 @@
 
 from physics.collision.distances import core_distance
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import at, stage
+from physics.compiler.jit import at, stage
 from physics.model.features import cached_by_features
 from physics.scene.shapes import PARTICLES, PLANE
 

@@ -7,7 +7,7 @@ the half-pair; which ones are compiled depends on the features.
 import inspect
 from typing import Any
 
-from physics.jit import sequence, stage
+from physics.compiler.jit import sequence, stage
 from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
 
 

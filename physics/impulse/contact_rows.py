@@ -8,8 +8,8 @@ from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
 from physics.collision.relative_frame import relative_pose
 from physics.collision.surface_kinds import by_surface_kind
+from physics.compiler.jit import LANES, at, stage
 from physics.impulse.point_impulses import effective_masses, relative_velocity
-from physics.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated

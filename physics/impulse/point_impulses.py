@@ -3,7 +3,7 @@
 import math
 from typing import Any, NamedTuple
 
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.motion.vectors import cross, tensor_times
 
 

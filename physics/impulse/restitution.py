@@ -20,13 +20,13 @@ The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the fac
 import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
+from physics.compiler.jit import LANES, at, sequence, stage
 from physics.impulse.point_impulses import (
     add_opposite,
     apply_impulse,
     operands_of,
     relative_velocity,
 )
-from physics.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
 from physics.motion.drives import make_finger_velocity_coupling
 

@@ -15,6 +15,7 @@ and the normal n out of the surface, a substep
    are apart and the soft contact of `sweep.py` for those that overlap.
 """
 
+from physics.compiler.jit import LANES, at, sequence, stage
 from physics.impulse.contact_rows import make_contact_rows
 from physics.impulse.point_impulses import (
     add_opposite,
@@ -25,7 +26,6 @@ from physics.impulse.point_impulses import (
 )
 from physics.impulse.restitution import make_impacts
 from physics.impulse.sweep import make_sweep
-from physics.jit import LANES, at, sequence, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.model.lanes import record_contacts

@@ -17,8 +17,8 @@ law for the relative angular velocity.
 
 import math
 
+from physics.compiler.jit import LANES, at, stage
 from physics.impulse.point_impulses import apply_angular_impulse, apply_impulse, relative_velocity
-from physics.jit import LANES, at, stage
 from physics.model.features import cached_by_features
 
 # m/s, largest speed at which overlapping bodies are pushed apart

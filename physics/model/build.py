@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.jit import LANES, aligned_zeros
+from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.coefficients import (
     compound_part_columns,
     dynamic_columns,

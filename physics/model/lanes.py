@@ -7,7 +7,7 @@ what is rare goes lane by lane. Lanes never mix: a world's result does not depen
 the other lanes.
 """
 
-from physics.jit import LANES, stage
+from physics.compiler.jit import LANES, stage
 from physics.model.features import Features, cached_by_features
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE
 from physics.model.tables import Model

@@ -6,15 +6,15 @@ surface of the other.
 
 Identical worlds share one row per dynamic body and half-pair. With per-world parameters each lane
 group (LANES worlds side by side) has rows of its own, and the columns named in *_PER_WORLD hold one
-value per lane. Kernels read both kinds by `physics.jit.at`, which compiles to nothing where worlds
-are identical.
+value per lane. Kernels read both kinds by `at` of `physics.compiler.jit`, which compiles to nothing
+where worlds are identical.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from physics.jit import LANES
+from physics.compiler.jit import LANES
 
 Array = np.ndarray
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.jit import LANES, aligned_zeros
+from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.contact_memory import contact_memory
 from physics.model.features import Features, cached_by_features
 from physics.model.tables import Model

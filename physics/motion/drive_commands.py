@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.code_cache import SOURCES
-from physics.jit import entry
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import entry
 
 Array = np.ndarray
 

@@ -7,7 +7,7 @@ once both are saturated. Along x and z the fingers move as one solid: forces on 
 half each.
 """
 
-from physics.jit import LANES, stage
+from physics.compiler.jit import LANES, stage
 from physics.model.features import cached_by_features
 
 CLOSING = 1  # axis along which grippers close

@@ -1,6 +1,6 @@
 """Gravity: a uniform field exerts no torque. It comes first and so clears the last step's sums."""
 
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 
 
 @stage

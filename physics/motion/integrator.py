@@ -12,7 +12,7 @@ slimmest axis. Such a rotation is made in up to MOST_PARTS parts of at most SMAL
 
 import math
 
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
 from physics.motion.kinematics import angular_velocity_of
 from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far

@@ -1,6 +1,6 @@
 """Frames of all solids: rotation matrix, velocity and angular velocity from the state."""
 
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
 from physics.rotation import rotation_entries
 

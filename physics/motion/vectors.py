@@ -1,6 +1,6 @@
 """Products of 3-vectors, rotation matrices and symmetric tensors whose entries stand in lanes."""
 
-from physics.jit import stage
+from physics.compiler.jit import stage
 
 
 @stage

@@ -7,7 +7,7 @@ candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vec
 import numpy as np
 
 from physics.collision.contact_point import HIDDEN, make_touch
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, PLANE

@@ -7,7 +7,7 @@ conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in 
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.relative_frame import relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
-from physics.jit import LANES, at, sequence, stage
+from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
 from physics.model.lanes import record_contacts
 from physics.motion.vectors import rotated

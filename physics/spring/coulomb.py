@@ -38,7 +38,7 @@ holds nothing still, and is the cheapest.
 
 import math
 
-from physics.jit import stage
+from physics.compiler.jit import stage
 
 # multiple of the cone, beyond the first, of damping that a lasting contact may remember. A body
 # that slides to rest needs several on its rear edge, which carries a third of the mean load

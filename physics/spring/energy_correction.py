@@ -20,7 +20,7 @@ The force acts at the ball's centre, and reports of contacts don't include it.
 import math
 
 from physics.collision.distances import box_distance
-from physics.jit import LANES, at, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 

@@ -40,7 +40,7 @@ first touch.
 
 import math
 
-from physics.jit import stage
+from physics.compiler.jit import stage
 
 # a contact lasts up to this multiple of (load / m) / omega, or more, see the end
 _CALM = 2.0

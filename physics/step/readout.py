@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.code_cache import SOURCES
-from physics.jit import LANES, at, entry, stage
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import LANES, at, entry, stage
 from physics.model.features import GENERAL, NO_ROTATION, Features, cached_by_features
 from physics.model.lanes import make_constants
 from physics.motion.kinematics import angular_velocity_of

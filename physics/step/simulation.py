@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.jit import LANES, columns
+from physics.compiler.jit import LANES, columns
 from physics.model.build import build, expand_per_world, write_per_world
 from physics.model.features import ISOTROPIC, Features
 from physics.model.pairs import Layout

@@ -2,8 +2,8 @@
 
 from physics.collision.broadphase import make_broadphase
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.jit import sequence
 from physics.impulse.solver import make_impulses
-from physics.jit import sequence
 from physics.model.features import Features, cached_by_features
 from physics.model.lanes import end_refresh
 from physics.motion.drives import make_drives, make_finger_coupling

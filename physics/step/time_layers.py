@@ -8,9 +8,9 @@ collision step.
 import math
 from functools import cache
 
-from physics.code_cache import SOURCES
 from physics.collision.broadphase import make_forget
-from physics.jit import LANES, large_entry, stage
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import LANES, large_entry, stage
 from physics.model.features import Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames

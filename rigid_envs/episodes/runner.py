@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Snapshot, World
-from physics.jit import columns
+from physics.compiler.jit import columns
 from physics.scene.validation import choice, instance
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.bounds import clip

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.code_cache import SOURCES
-from physics.jit import entry, stage
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
 

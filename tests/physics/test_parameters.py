@@ -22,7 +22,7 @@ from physics import (
     Static,
     World,
 )
-from physics.jit import LANES
+from physics.compiler.jit import LANES
 from physics.reference import scenes
 from physics.reference.scenes import GRAVITY
 from physics.scene.parameters import with_parameters

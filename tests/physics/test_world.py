@@ -20,7 +20,7 @@ from physics import (
     Sphere,
     World,
 )
-from physics.jit import LANES
+from physics.compiler.jit import LANES
 from physics.model.contact_memory import contact_memory
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
 from physics.reference import scenes

@@ -24,7 +24,7 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
-from physics.linking import EntryPipeline, SequencePipeline, StagePipeline
+from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 
 Array = np.ndarray
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics import World, code_cache
+from physics import World
+from physics.compiler import code_cache
 from physics.reference import scenes
 
 PACKAGE = Path(physics.__file__).parent

@@ -40,7 +40,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from physics.code_cache import StageFile, is_cacheable
+from physics.compiler.code_cache import StageFile, is_cacheable
 
 # what remains of numba's default pipeline before the lowering
 _BEFORE_LOWERING = (

@@ -2,7 +2,7 @@
 
 Numba caches entries. It notices edits of the file that defines an entry, but not of the stages that
 it calls. So every entry mentions a local variable of its factory that is `SOURCES`, a hash of all
-sources of this package: numba hashes closure cells, and an edit anywhere in the package is a cache
+sources of the engine: numba hashes closure cells, and an edit anywhere in the engine is a cache
 miss. (A hash that ignores comments would cost every process 80 ms when it starts; this one costs
 2 ms.)
 
@@ -30,7 +30,7 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 
 
 def _hash_sources() -> int:
@@ -54,8 +54,8 @@ _MADE_BY = repr((
 
 
 def is_cacheable(stage: Any) -> bool:
-    """Whether a stage is of this package, whose sources are hashed."""
-    return str(stage.__module__).startswith(f"{__package__}.")
+    """Whether a stage is of the engine, whose sources are hashed."""
+    return str(stage.__module__).startswith(f"{_PACKAGE.name}.")
 
 
 def _identity(value: Any) -> Any:

@@ -1,0 +1,1 @@
+"""How numba compiles kernels, and where compiled code is kept."""
