@@ -37,8 +37,8 @@ from physics.motion.vectors import rotated_back, tensor_times
 def make_warm_start(features):
     """Stage that applies the first guess: the impulses of the last substep, relaxed.
 
-    `extra_impulse` was minus the impulses of the last substep. With the relaxed ones added it is
-    what relaxing itself gave, which belongs to the force of this step, too.
+    `contact_rows` sets `extra_impulse` to the impulses of the last substep with reversed sign.
+    Adding the relaxed ones leaves the change that relaxing made; this step's force includes it.
     """
     friction, resistance = features.friction, features.resistance
 

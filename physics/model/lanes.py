@@ -158,9 +158,10 @@ def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
 
 @stage
 def end_refresh(model, state, workspace, g):
-    """Restores the forces of lanes that needed no refresh, which runs over the whole group.
+    """Ends a refresh, which computes forces in the whole group: other lanes get theirs back.
 
-    From now on all active lanes update what contacts remember, see `broadphase.make_forget`.
+    `broadphase.make_forget` had limited `updates_memory` to the lanes that need the refresh; now it
+    holds for all active lanes again.
     """
     lane = workspace.lane[0]
     for i in range(LANES):

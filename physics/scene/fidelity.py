@@ -41,8 +41,8 @@ class Fidelity:
         spacing: largest distance of samples, as a fraction of the smallest width among the solid
             and all bodies.
         rounding: radius of a box's edges, as a fraction of the box's smallest half width.
-        skin: separation at which a sample becomes a broadphase candidate, as a fraction of a body's
-            smallest width.
+        skin: separation at which a sample becomes a broadphase candidate, as a fraction of the
+            smallest width of the two solids; statics and grounds don't count.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type, out of range or not supported by the
