@@ -1,8 +1,10 @@
 """Where a candidate touches: point, normal and penetration, in the frame of the surface.
 
-The contact point lies on the line from the sample along the normal. Between two solids it is in the
-middle of the overlap. The ground is rigid and the solid's surface undeformed, so there it is the
-sample's lowest point: friction then acts at the arm that a rigid body has (docs/decisions).
+The contact point lies on the line from the sample along the normal, within the overlap. On the
+undeformed surface of a body friction would have the arm that a rigid body has. But both bodies need
+the same point, or angular momentum is not conserved. So their surfaces yield, each by a part of the
+overlap that is proportional to the other's mass: between equal bodies the point is in the middle.
+Grounds, statics and drives never rotate, so their arm doesn't matter, and only they yield.
 """
 
 import math
@@ -28,7 +30,7 @@ def make_touch(features, kind):
     surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
 
     @stage
-    def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, face_normals):
+    def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, overlap_share, face_normals):
         """Of the candidate in lane i of a slot.
 
         Args:
@@ -41,6 +43,7 @@ def make_touch(features, kind):
             cc: m, its third.
             radius: m, of sample and surface together.
             owner_radius: m, of the sample.
+            overlap_share: part of the overlap by which the owner's surface yields.
             face_normals: see `box_distance`.
 
         Returns:
@@ -76,7 +79,7 @@ def make_touch(features, kind):
         else:
             distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)
         penetration = radius - distance
-        arm = owner_radius - 0.5 * penetration
+        arm = owner_radius - overlap_share * penetration
         return rx - arm * nx, ry - arm * ny, rz - arm * nz, nx, ny, nz, penetration, face
 
     return touch

@@ -34,6 +34,17 @@ def relative_pose(owner, surface, relative):
 
 
 @stage
+def relative_gravity(surface, gravity, relative):
+    """A vector in m/s^2 in the frame of the surface."""
+    B, out = surface.rotation, relative.gravity
+    for i in range(LANES):
+        x, y, z = rotated_back(B, i, gravity[0], gravity[1], gravity[2])
+        out[0, i] = x
+        out[1, i] = y
+        out[2, i] = z
+
+
+@stage
 def relative_velocities(owner, surface, relative):
     """Velocities of the owner relative to the rotating surface; clears force and torque."""
     B, a, b = surface.rotation, owner.position, surface.position

@@ -50,15 +50,17 @@ def make_prepare(features, kind):
         G = frame.rotation if compound else surface.rotation
         Q, a, b = surface.rotation, owner.position, surface.position
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
+        overlap_share = constants.overlap_share
         face_normals, pair_mass = constants.face_normals != 0, constants.pair_mass
         for n in range(slots):
             row, point = candidate[n], points[n]
             memory = row.memory
             for i in range(LANES):
                 radius, owner_radius = at(radii, i), at(owner_radii, i)
+                share = at(overlap_share, i)
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 x, y, z, nx, ny, nz, penetration, face = touch(
-                    row, i, R, c, ca, cb, cc, radius, owner_radius, face_normals
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals
                 )
                 weight = row.weight[i]
                 if box and compound:

@@ -165,6 +165,12 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         row["first_slot"], row["slot_count"] = slots, half_pair.capacity
         slots += half_pair.capacity
         row["face_normals"] = half_pair.face_normals
+        row["slide_slope"] = 1.0
+        for sign, body, other in ((1.0, owner, surface), (-1.0, surface, owner)):
+            if body < layout.bodies and other >= layout.dynamic_count:
+                row["gravity"] = sign * layout.gravity
+                if layout.leverage[body] == 0.0:  # it rolls
+                    row["slide_slope"] = layout.modes[body, 1]
         solids = layout.solids[owner], layout.solids[surface]
         if any(isinstance(solid, Body) for solid in solids):  # nothing else rotates
             for name in ("rolling", "spinning"):
@@ -197,11 +203,17 @@ def _features(
         if isotropic
         else GENERAL
     )
+    # the normal of a ground is z; statics have normals in all directions
+    slope = any(
+        np.any(row["gravity"][:2]) or (row["kind"] != PLANE and np.any(row["gravity"]))
+        for row in model.half_pair
+    )
     return Features(
         impulse=impulse,
         dashpot=not impulse and fidelity.damping == "dashpot" and len(model.half_pair) > 0,
         friction=friction,
         viscous=friction and fidelity.friction == "viscous",
+        slope=slope and friction and fidelity.friction == "coulomb" and not impulse,
         resistance=resistance,
         rotation=rotation,
         plane=PLANE in kinds,

@@ -6,7 +6,7 @@ half-pairs, so a world's numbers are bitwise the same however many are computed 
 
 import numpy as np
 
-from physics.model.normal_damping import damping_coefficients, rest_speed
+from physics.model.normal_damping import damping_coefficients, damping_errors, rest_speed
 from physics.model.pairs import Layout, pair_stiffness
 from physics.model.tangential import SHEAR_RATIO, shear_ratio, tangential_coefficients
 from physics.scene.compound import Compound
@@ -116,10 +116,13 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
 
     if fidelity.law == "impulse":
         damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
+        damping_error = np.zeros(stiffness.shape)
         slowest = np.full(stiffness.shape, REST_STEPS * g * h)
     else:
         floor = _SLIM_RESTITUTION * fidelity.contact_resolution * (1.0 - soft)
-        damping = damping_coefficients(np.maximum(restitution, floor), fidelity.damping)
+        reached = np.maximum(restitution, floor)
+        damping = damping_coefficients(reached, fidelity.damping)
+        damping_error = damping_errors(reached, damping, fidelity.damping)
         slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
 
     # only the widths of dynamic bodies limit the skin
@@ -156,11 +159,13 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "skin": fidelity.skin * np.minimum(moving[:, a], moving[:, b]),
         "stiffness": stiffness,
         "damping": damping,
+        "damping_error": damping_error,
         "restitution": restitution,
         "rest_speed": slowest,
         "pair_mass": pair_mass,
         "owner_inverse_mass": inverse[:, a],
         "surface_inverse_mass": inverse[:, b],
+        "overlap_share": _overlap_share(layout, mass, a, b),
         "surface_centre": _surface_centres(layout, size[:, b]),
         "surface_inverse_inertia": _surface_inverse_inertia(layout, p),
         "shear_stiffness": shear_stiffness,
@@ -169,6 +174,14 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
         "twist_damping": np.where(turns, twist_damping, 0.0),
     }
+
+
+def _overlap_share(layout: Layout, mass: Array, a: Array, b: Array) -> Array:
+    """[n, half-pairs]: part of the overlap by which the owner yields, see `contact_point`."""
+    bodies = np.arange(len(layout.solids)) < layout.bodies
+    inverse = np.where(bodies, 1.0 / mass, 0.0)  # nothing else rotates
+    least = np.finfo(float).tiny  # neither is a body: the point doesn't matter
+    return np.asarray(inverse[:, b] / np.maximum(inverse[:, a] + inverse[:, b], least))
 
 
 def _surface_centres(layout: Layout, size: Array) -> Array:

@@ -21,6 +21,7 @@ class Features(NamedTuple):
         dashpot: linear damping instead of Hunt-Crossley damping.
         friction: at least one pair has friction; adds the tangential law and its history.
         viscous: viscous friction, without history.
+        slope: weight can press along a ground or static.
         resistance: at least one pair has rolling or spinning resistance.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
@@ -34,6 +35,7 @@ class Features(NamedTuple):
     dashpot: bool
     friction: bool
     viscous: bool
+    slope: bool
     resistance: bool
     rotation: int
     plane: bool

@@ -47,6 +47,38 @@ def damping_coefficients(restitution: Array, law: str) -> Array:
     return np.array(found)[where].reshape(restitution.shape)
 
 
+def damping_errors(restitution: Array, damping: Array, law: str) -> Array:
+    """Relative error of a "hunt_crossley" coefficient per (omega h)^2; 0 of a "dashpot".
+
+    Steps of h change what a damping coefficient a does. In units of v and 1/omega, with
+    s = omega h and W = ln(1 + a u), the law of a step (`hunt_crossley_force`) is
+
+        W(t + s/2) - W(t - s/2) = -ln(1 + x + x^2/2) = -x + x^3/6 + ...,  x = s a d,
+        d(t + s) - d(t) = s u(t + s/2).
+
+    By Taylor expansion smooth u(t) and d(t) obey, up to higher orders of s and with D = d/dt,
+
+        D W = -a d + s^2 (a^3 d^3 / 6 - D^3 W / 24),  D d = u - s^2 D^2 u / 24.
+
+    So the first integral E = u/a - ln(1 + a u)/a^2 + d^2/2 is not constant:
+    D E = s^2 a d^3 (3 a u - 1) / 24. Over a contact the integral of d^3 u vanishes, and that of d^3
+    is (1 - e^2)/a, so E falls by s^2 (1 - e^2)/24. (First and last touch add nothing of this order,
+    because the law takes the mean penetration of a step.) E at the end depends on e, so this is an
+    error of e; divided by de/da it is an error of a, which relative to a is
+
+        (1 - e^2) / (24 (e^2/(1 - a e) - 1/(1 + a))),  between 0 (e = 0) and 1/12 (e = 1).
+
+    Where samples of the weight W are in contact, omega^2 is W k/m.
+    """
+    e, a = np.clip(restitution, _LEAST_RESTITUTION, 1.0), damping
+    if law == "dashpot":
+        return np.zeros(e.shape)
+    out, back = 1.0 + a, 1.0 - a * e
+    bounces = e < 1.0
+    slope = np.where(bounces, 24.0 * (e * e * out - back), 1.0)
+    return np.where(bounces, (1.0 - e * e) * out * back / slope, 0.0)
+
+
 @lru_cache(maxsize=4096)
 def damping_coefficient(restitution: float, law: str) -> float:
     """Dimensionless damping: a of the "hunt_crossley" law, the ratio zeta of the "dashpot"."""

@@ -54,6 +54,10 @@ HALF_PAIR = np.dtype(
         ("first_slot", "i8"),  # into State.candidate
         ("slot_count", "i8"),
         ("face_normals", "i8"),  # 1: samples of a box, which faces push out, see `box_distance`
+        # of a body on a ground or static: gravity of the owner less that of the surface, m/s^2, in
+        # the world frame; and the slope above which it slides, over mu: more than 1 if it can roll
+        ("gravity", "f8", (3,)),
+        ("slide_slope", "f8"),
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
@@ -65,11 +69,13 @@ HALF_PAIR = np.dtype(
         ("skin", "f8"),  # m
         ("stiffness", "f8"),  # N/m of a whole face
         ("damping", "f8"),  # coefficient of the law
+        ("damping_error", "f8"),  # relative, per (omega h)^2, see normal_damping.py
         ("restitution", "f8"),
         ("rest_speed", "f8"),  # m/s, lower bound of the impact speed
         ("pair_mass", "f8"),  # kg, reduced mass
         ("owner_inverse_mass", "f8"),  # 1/kg
         ("surface_inverse_mass", "f8"),  # 1/kg; 0 for statics
+        ("overlap_share", "f8"),  # of the owner, see contact_point.py
         ("surface_centre", "f8", (3,)),  # m, centre of mass of the surface's solid, in its frame
         ("surface_inverse_inertia", "f8", (3,)),  # 1/(kg m^2) of that solid, where it matters
         ("shear_stiffness", "f8"),  # N/m
@@ -94,11 +100,13 @@ HALF_PAIR_PER_WORLD = (
     "skin",
     "stiffness",
     "damping",
+    "damping_error",
     "restitution",
     "rest_speed",
     "pair_mass",
     "owner_inverse_mass",
     "surface_inverse_mass",
+    "overlap_share",
     "surface_centre",
     "surface_inverse_inertia",
     "shear_stiffness",

@@ -38,6 +38,8 @@ SOLID = np.dtype(
         ("current_weight", "f8", (LANES,)),  # of the samples in contact
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
+        ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
+        ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
         ("updates_candidates", "f8", (LANES,)),  # 1 where they remember this step: not in a refresh
     ],
     align=True,

@@ -4,6 +4,8 @@ Everything is computed in the frame of the surface, where the surface is at rest
 candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vectorise it.
 """
 
+import math
+
 import numpy as np
 
 from physics.collision.contact_point import HIDDEN, make_touch
@@ -11,7 +13,7 @@ from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, PLANE
-from physics.spring.coulomb import friction_force, twist_torque, viscous_force
+from physics.spring.coulomb import friction_force, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
 from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
 
@@ -33,6 +35,7 @@ def make_contact_loop(features, kind, report):
     """Loop over the slots of a half-pair; with `report` it also writes a row for each candidate."""
     viscous, resistance = features.viscous, features.resistance
     friction = features.friction and not viscous
+    slope = features.slope
     normal_force = dashpot_force if features.dashpot else hunt_crossley_force
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
     touch = make_touch(features, kind)
@@ -50,13 +53,15 @@ def make_contact_loop(features, kind, report):
         v, omega = relative.velocity, relative.angular_velocity
         force, torque, normal_force_sum = relative.force, relative.torque, relative.normal_force_sum
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
-        stiffness, damping, floors = constants.stiffness, constants.damping, constants.rest_speed
+        stiffness, damping, floors = constants.stiffness, relative.damping, constants.rest_speed
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight, updates = relative.current_weight, relative.updates_candidates
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals = constants.face_normals != 0
+        overlap_share = constants.overlap_share
+        gravity, fall, steep = constants.gravity, relative.gravity, constants.slide_slope
         rolling, spinning = constants.rolling, constants.spinning
         twist_stiffness, twist_damping = constants.twist_stiffness, constants.twist_damping
         for n in range(slots):
@@ -66,12 +71,13 @@ def make_contact_loop(features, kind, report):
                 weight, mu = weights[i], at(frictions, i)
                 radius, owner_radius = at(radii, i), at(owner_radii, i)
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
-                k, a, floor = at(stiffness, i), at(damping, i), at(floors, i)
+                k, a, floor = at(stiffness, i), damping[i], at(floors, i)
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
+                share = at(overlap_share, i)
                 inverse_mass = 1.0 / mass
                 rx, ry, rz, nx, ny, nz, penetration, face = touch(
-                    row, i, R, c, ca, cb, cc, radius, owner_radius, face_normals
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
@@ -97,6 +103,7 @@ def make_contact_loop(features, kind, report):
                 if box:  # a sample that changed the face is a new contact
                     same = (face == memory[FACE, i]) | (not face_normals)
                     impact_speed = impact_speed if same else 0.0
+                begins = impact_speed == 0.0
                 normal, impact_speed, persistence = normal_force(
                     penetration,
                     approach,
@@ -129,9 +136,35 @@ def make_contact_loop(features, kind, report):
                     fx, fy, fz = normal * nx, normal * ny, normal * nz
                 if friction:
                     sx, sy, sz = memory[SHEAR, i], memory[SHEAR + 1, i], memory[SHEAR + 2, i]
+                    most = None
+                    if slope:
+                        if plane:
+                            wx, wy, wz = winding(
+                                mass, mu, steep, gravity[0], gravity[1], gravity[2], 0.0, 0.0, 1.0
+                            )
+                        else:
+                            wx, wy, wz = winding(
+                                mass, mu, steep, fall[0, i], fall[1, i], fall[2, i], nx, ny, nz
+                            )
+                        begun = persistence / shear_k if begins else 0.0
+                        sx, sy, sz = sx + begun * wx, sy + begun * wy, sz + begun * wz
+                        downhill = sx * wx + sy * wy + sz * wz > 0.0
+                        most = math.sqrt(wx * wx + wy * wy + wz * wz) if downhill else 0.0
                     if plane:
                         gx, gy, gz, sx, sy, sz = friction_force(
-                            normal, ux, uy, 0.0, shear_k, shear_c, mu, h, sx, sy, 0.0, persistence
+                            normal,
+                            ux,
+                            uy,
+                            0.0,
+                            shear_k,
+                            shear_c,
+                            mu,
+                            h,
+                            sx,
+                            sy,
+                            0.0,
+                            persistence,
+                            most,
                         )
                         fx += gx
                         fy += gy
@@ -150,6 +183,7 @@ def make_contact_loop(features, kind, report):
                             sy - along * ny,
                             sz - along * nz,
                             persistence,
+                            most,
                         )
                         fx += gx
                         fy += gy

@@ -5,7 +5,7 @@ conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in 
 """
 
 from physics.collision.compound_frames import mark_hidden_faces
-from physics.collision.relative_frame import relative_pose, relative_velocities
+from physics.collision.relative_frame import relative_gravity, relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
@@ -38,6 +38,7 @@ def make_half_pair(features, report):
 def make_half_pair_of_kind(features, kind, report):
     """The same, for half-pairs whose surface is of one kind."""
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    slope = features.slope
     begin_half_pair = make_begin_half_pair(features)
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
@@ -58,6 +59,8 @@ def make_half_pair_of_kind(features, kind, report):
         if not plane:
             relative_pose(owner, frame, relative)
             relative_velocities(owner, frame, relative)
+            if slope:
+                relative_gravity(frame, constants.gravity, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
         # The normal on a ball or capsule (`face_normals` 0) can leap from face to face of a box
@@ -84,6 +87,8 @@ def make_begin_half_pair(features):
         The load rate m / (W h) turns a change of velocity into a force; W / F is the inverse of the
         mean force.
 
+        Also corrects the damping coefficient for (omega h)^2 W, see model/normal_damping.py.
+
         m is the pair mass and h the step. W is the sum of the weights of the samples that were in
         contact in the last step, over all half-pairs of the pair, and F their normal force. Both
         results are zero where nothing was in contact. Candidates keep their memory in a refresh
@@ -97,7 +102,8 @@ def make_begin_half_pair(features):
         )
         # without a reverse half-pair (-1) row 0 is named, and not read
         other = workspace.half_pair[max(half_pair.reverse, 0)]
-        pair_mass = half_pair.pair_mass
+        pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
+        damping, errors = half_pair.damping, half_pair.damping_error
         if compound:
             sum_of_pair(model, workspace, k, relative.current_weight, relative.normal_force_sum)
         for i in range(LANES):
@@ -111,6 +117,9 @@ def make_begin_half_pair(features):
                     other.previous_normal_force[i] if both else 0.0
                 )
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
+            known = weight if weight > 0.0 else 1.0
+            error = at(errors, i) * known * at(stiffness, i) * (h * h) / at(pair_mass, i)
+            relative.damping[i] = at(damping, i) * (1.0 - error)
             relative.inverse_mean_force[i] = weight / force if force > _LEAST_FORCE else 0.0
             relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0

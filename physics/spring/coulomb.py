@@ -28,6 +28,15 @@ which `tangential_coefficients` solves for c: near 1/sqrt(2) of critical damping
 error is at most a dt^2 / 8, and for a box on another than its widest face the difference in
 rocking (`python -m benchmarks accuracy`).
 
+A body set down on a slope steeper than its friction angle slides from the first moment, but its
+spring is slack and gives too little friction until it is charged. With gravity g_t along the slope
+and g_n across it, and omega_t^2 = k_t/m, the spring has charged after the time t at which
+g_t (1 - cos omega_t t) = mu g_n. The body then has the speed g_t sin(omega_t t) / omega_t, and by
+Coulomb's law (g_t - mu g_n) t. At 30 degrees and mu = 0.5 it stays too fast by 0.4 g/omega_t.
+So a contact with a ground or static that begins where its weight alone makes the body slide begins
+wound up, to `_WOUND_UP` times the cone of the weight. It stays wound up while its shear points down
+the slope.
+
 Resistance against rolling and spinning is the same law for the relative angular velocity across the
 normal and along it, with torques up to a length times the normal force. A rolling ball slows by
 5/7 g c/R.
@@ -43,10 +52,39 @@ from physics.compiler.jit import stage
 # multiple of the cone, beyond the first, of damping that a lasting contact may remember. A body
 # that slides to rest needs several on its rear edge, which carries a third of the mean load
 _AT_REST = 10.0
+# As much as the cone can grow while a body is set down: when it drops from zero penetration it
+# presses with up to twice its weight; all of this on an edge, which has 3/8 of a face's stiffness
+_WOUND_UP = 2.0 / (3.0 / 8.0)
 
 
 @stage
-def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence):
+def winding(mass, mu, steep, gx, gy, gz, nx, ny, nz):
+    """Force along the slope to which a contact is wound up.
+
+    Args:
+        mass: kg, pair mass.
+        mu: coefficient of friction.
+        steep: the body slides where the slope exceeds this times mu, see `HALF_PAIR.slide_slope`.
+        gx: m/s^2, gravity of the owner relative to the surface.
+        gy: likewise.
+        gz: likewise.
+        nx: of the normal.
+        ny: likewise.
+        nz: likewise.
+
+    Returns:
+        Force x y z in N; zero where the body can rest.
+    """
+    along = gx * nx + gy * ny + gz * nz
+    gx, gy, gz = gx - along * nx, gy - along * ny, gz - along * nz
+    down = math.sqrt(gx * gx + gy * gy + gz * gz + 1e-60)
+    cone = mu * max(-along, 0.0)
+    factor = _WOUND_UP * mass * cone / down if down > steep * cone else 0.0
+    return factor * gx, factor * gy, factor * gz
+
+
+@stage
+def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, most):
     """Tangential force of a sample that carries the whole pair's stiffness.
 
     Args:
@@ -62,6 +100,7 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence):
         sy: likewise.
         sz: likewise.
         persistence: 1 for a contact that lasts, falling to 0 for one that collides.
+        most: N, up to which the trial force is remembered if that is more than the cone, or None.
 
     Returns:
         Force x y z in N, and shear x y z to remember in m.
@@ -75,9 +114,16 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence):
     inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
     cut = min(1.0, limit * inverse)
-    fx *= cut
-    fy *= cut
-    fz *= cut
+    rx = fx * cut
+    ry = fy * cut
+    rz = fz * cut
+    if most is None:
+        fx, fy, fz = rx, ry, rz
+    else:
+        remembered = min(1.0, max(limit, most) * inverse)
+        fx *= remembered
+        fy *= remembered
+        fz *= remembered
     # forgotten after the step, not before: the trial force need not wait for the normal law
     lasting = persistence * persistence
     back = -lasting / k if normal > 0.0 else 0.0
@@ -85,7 +131,7 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence):
     sx = back * (fx + damped * ux)
     sy = back * (fy + damped * uy)
     sz = back * (fz + damped * uz)
-    return fx, fy, fz, sx, sy, sz
+    return rx, ry, rz, sx, sy, sz
 
 
 @stage
@@ -123,10 +169,10 @@ def twist_torque(normal, wx, wy, wz, nx, ny, nz, k, c, rolling, spinning, h, tx,
     spin, twist = wx * nx + wy * ny + wz * nz, tx * nx + ty * ny + tz * nz
     ax, ay, az, px, py, pz = friction_force(
         normal, wx - spin * nx, wy - spin * ny, wz - spin * nz, k, c, rolling, h,
-        tx - twist * nx, ty - twist * ny, tz - twist * nz, 1.0,
+        tx - twist * nx, ty - twist * ny, tz - twist * nz, 1.0, None,
     )  # fmt: skip
     along, _, _, turn, _, _ = friction_force(
-        normal, spin, 0.0, 0.0, k, c, spinning, h, twist, 0.0, 0.0, 1.0
+        normal, spin, 0.0, 0.0, k, c, spinning, h, twist, 0.0, 0.0, 1.0, None
     )
     return (
         ax + along * nx,

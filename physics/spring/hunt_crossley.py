@@ -46,7 +46,7 @@ from physics.compiler.jit import stage
 _CALM = 2.0
 # multiple of the mean force from which a sample counts by its own force, see 1. Forces within a
 # leaning tower differ by less; if the rule applied there it would act as a softening spring
-_OVERLOADED = 1.6
+_OVERLOADED = 1.4
 
 
 @stage
