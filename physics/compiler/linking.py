@@ -91,6 +91,9 @@ class _Codegen:
 class _Library(JITCodeLibrary):
     """The code of a kernel, with the functions within it."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Left out: `_optimize_final_module` does all of it again."""
+
     def _optimize_final_module(self) -> None:
         manager, builder = self._codegen._module_pass_manager()
         manager.run(self._final_module, builder)
