@@ -4,8 +4,6 @@ Everything is computed in the frame of the surface, where the surface is at rest
 candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vectorise it.
 """
 
-import math
-
 import numpy as np
 
 from physics.collision.contact_point import HIDDEN, make_touch
@@ -136,20 +134,20 @@ def make_contact_loop(features, kind, report):
                     fx, fy, fz = normal * nx, normal * ny, normal * nz
                 if friction:
                     sx, sy, sz = memory[SHEAR, i], memory[SHEAR + 1, i], memory[SHEAR + 2, i]
-                    most = None
+                    wound = None
                     if slope:
                         if plane:
-                            wx, wy, wz = winding(
+                            wound = winding(
                                 mass, mu, steep, gravity[0], gravity[1], gravity[2], 0.0, 0.0, 1.0
                             )
                         else:
-                            wx, wy, wz = winding(
+                            wound = winding(
                                 mass, mu, steep, fall[0, i], fall[1, i], fall[2, i], nx, ny, nz
                             )
                         begun = persistence / shear_k if begins else 0.0
-                        sx, sy, sz = sx + begun * wx, sy + begun * wy, sz + begun * wz
-                        downhill = sx * wx + sy * wy + sz * wz > 0.0
-                        most = math.sqrt(wx * wx + wy * wy + wz * wz) if downhill else 0.0
+                        sx += begun * wound[0]
+                        sy += begun * wound[1]
+                        sz += begun * wound[2]
                     if plane:
                         gx, gy, gz, sx, sy, sz = friction_force(
                             normal,
@@ -164,7 +162,7 @@ def make_contact_loop(features, kind, report):
                             sy,
                             0.0,
                             persistence,
-                            most,
+                            wound,
                         )
                         fx += gx
                         fy += gy
@@ -183,7 +181,7 @@ def make_contact_loop(features, kind, report):
                             sy - along * ny,
                             sz - along * nz,
                             persistence,
-                            most,
+                            wound,
                         )
                         fx += gx
                         fy += gy

@@ -84,7 +84,7 @@ def winding(mass, mu, steep, gx, gy, gz, nx, ny, nz):
 
 
 @stage
-def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, most):
+def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wound):
     """Tangential force of a sample that carries the whole pair's stiffness.
 
     Args:
@@ -100,7 +100,8 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, mos
         sy: likewise.
         sz: likewise.
         persistence: 1 for a contact that lasts, falling to 0 for one that collides.
-        most: N, up to which the trial force is remembered if that is more than the cone, or None.
+        wound: x y z in N, see `winding`, or None. A trial force against it is remembered up to this
+            amount, even if that is more than the cone.
 
     Returns:
         Force x y z in N, and shear x y z to remember in m.
@@ -117,9 +118,12 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, mos
     rx = fx * cut
     ry = fy * cut
     rz = fz * cut
-    if most is None:
+    if wound is None:
         fx, fy, fz = rx, ry, rz
     else:
+        wx, wy, wz = wound
+        most = math.sqrt(wx * wx + wy * wy + wz * wz)
+        most = most if fx * wx + fy * wy + fz * wz < 0.0 else 0.0
         remembered = min(1.0, max(limit, most) * inverse)
         fx *= remembered
         fy *= remembered

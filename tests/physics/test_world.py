@@ -486,7 +486,7 @@ def test_materials_and_sizes_compile_nothing_new():
     for scene in (
         scenes.block_on_ground((0.1, 0.1, 0.1), friction=0.9, restitution=0.7),
         scenes.sphere_on_ground(radius=0.3),
-        dataclasses.replace(scenes.block_on_ground(), gravity=(1.0, 2.0, 3.0)),
+        dataclasses.replace(scenes.block_on_ground(), gravity=(0.0, 0.0, 3.0)),
     ):
         assert features_of(scene) == first
 

@@ -33,8 +33,11 @@ PHASES = 100
 SPEED = 1.0
 
 
-def rebound(restitution, fidelity, friction=0.0):
-    """Rebound speeds [100] of a ball at 1 m/s whose touches fall on all phases of a step."""
+def rebound(restitution, fidelity, friction=0.0, frame=0.5):
+    """Rebound speeds [100] of a ball at 1 m/s whose touches fall on all phases of a step.
+
+    `frame` is the time of each call of `advance`, in s.
+    """
     scene = scenes.sphere_on_ground(
         friction=friction, restitution=restitution, gravity=0.0, linear_velocity=(0, 0, -SPEED)
     )
@@ -43,23 +46,25 @@ def rebound(restitution, fidelity, friction=0.0):
     step = world.fidelity.substep * SPEED
     position[:, 0, 2] = scenes.BALL.radius + step * (2.0 + np.arange(PHASES) / PHASES)
     world.set_state(position=position)
-    world.advance(0.5)
+    for _ in range(round(0.5 / frame)):
+        world.advance(frame)
     return world.linear_velocity[:, 0, 2]
 
 
 # --- along the normal ---------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("frame", [0.5, 1.0 / 60.0])
+@pytest.mark.parametrize(
+    ("fidelity", "tolerance"), [("fast", 7e-4), ("balanced", 7e-4), ("accurate", 3e-5)]
+)
 @pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75])
-def test_restitution_is_what_was_asked_for_at_every_phase_of_touch(restitution):
-    errors = np.abs(rebound(restitution, "accurate") - restitution)
-    assert errors.max() <= 1e-3
-
-
-@pytest.mark.parametrize(("fidelity", "tolerance"), [("balanced", 0.02), ("fast", 0.02)])
-@pytest.mark.parametrize("restitution", [0.25, 0.5, 0.75])
-def test_coarse_steps_keep_restitution_within_a_fiftieth(restitution, fidelity, tolerance):
-    assert np.abs(rebound(restitution, fidelity) - restitution).max() <= tolerance
+def test_restitution_is_what_was_asked_for_at_every_phase_of_touch(
+    restitution, fidelity, tolerance, frame
+):
+    """Frames of 1/60 s shorten the substep, and with it omega h: 0.486 and 0.463 instead of 0.5."""
+    errors = rebound(restitution, fidelity, frame=frame) - restitution
+    assert np.abs(errors).max() <= tolerance
 
 
 def test_without_restitution_a_ball_stays_down():
@@ -242,17 +247,24 @@ def test_a_ball_rolls_down_an_incline_at_five_sevenths_or_slides(degrees):
 
 
 @pytest.mark.parametrize(
-    ("fidelity", "impulse"), [("fast", 4e-3), ("balanced", 3e-3), ("accurate", 5e-4)]
+    ("fidelity", "impulse"), [("fast", 1e-3), ("balanced", 1e-3), ("accurate", 5e-4)]
 )
 @pytest.mark.parametrize("along", [2.0, 0.5])
 @pytest.mark.parametrize("friction", [0.05, 0.1, 0.2, 0.3, 1.0])
-def test_an_oblique_impact_gives_the_spin_of_the_impulse(friction, along, fidelity, impulse):
-    """Sliding through, where the impulse errs as restitution does, and sticking before the end."""
+@pytest.mark.parametrize("static", [False, True])
+def test_an_oblique_impact_gives_the_spin_of_the_impulse(
+    static, friction, along, fidelity, impulse
+):
+    """On the ground and on a static box. Sliding through, where the impulse errs as restitution
+    does, and sticking before the end."""
     down, restitution, radius = 1.0, 0.5, 0.1
     scene = scenes.sphere_on_ground(
         radius, friction, restitution, gravity=0.0, position=(0, 0, 0.11),
         linear_velocity=(along, 0, -down),
     )  # fmt: skip
+    if static:
+        box = Static(Box((2, 2, 1)), (0, 0, -1), material=Material(friction, restitution))
+        scene = replace(scene, statics=[box])
     world = World(scene, fidelity)
     world.advance(0.5)
     x, z, spin = closed_forms.oblique_impact(along, down, friction, restitution, radius)
