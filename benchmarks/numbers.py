@@ -1,7 +1,7 @@
 """Counts the tuned numbers of the engine: python -m benchmarks.numbers.
 
-It collects every numeric literal of physics/ by syntax tree. numbers.toml says of each whether it is
-tuned; those that are not have a reason. The table of tuned numbers in docs/physics.md is written
+It collects every numeric literal of physics/ by syntax tree. numbers.toml says of each whether it
+is tuned; those that are not have a reason. The table of tuned numbers in docs/physics.md is written
 from it with --write. `python -m benchmarks.sweep` measures other values of a tuned number.
 
 Some literals need no entry:
@@ -17,6 +17,7 @@ import ast
 import re
 import tomllib
 from collections import Counter, defaultdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def literals(source: str) -> list[tuple[str, float]]:
 def _needs_no_entry(chain: list[Any]) -> bool:
     """Whether a literal, the first of a chain of nodes each within the next, needs no entry."""
     value = chain[0].value
-    for inner, outer in zip(chain, chain[1:], strict=False):
+    for inner, outer in pairwise(chain):
         if isinstance(outer, ast.Subscript) and inner is outer.slice:
             return True
         if isinstance(outer, ast.Call) and getattr(outer.func, "id", "") == "range":
@@ -118,7 +119,9 @@ def table() -> Table:
          entry["reason"], f"`{entry['where'].split(':')[0]}`"]
         for entry in listed()["tuned"]
     ]  # fmt: skip
-    return Table("Tuned numbers", ["name", "value", "meaning", "why this value", "file"], rows)
+    return Table(
+        "numbers", "Tuned numbers", ["name", "value", "meaning", "why this value", "file"], rows
+    )
 
 
 def page_text(text: str) -> str:

@@ -16,6 +16,9 @@ from physics.scene.scene import Scene
 from physics.scene.shapes import Sphere
 from physics.scene.solids import Ground
 
+# largest sink of a body at rest, as a fraction of its width: its centre stays above the surface
+_DEEPEST = 0.5
+
 
 def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
     """Raises an error if the substep is too long for a scene.
@@ -110,8 +113,8 @@ def _check_sink(scene: Scene, fidelity: Fidelity, model: Model) -> None:
             continue
         width = scene.bodies[i].shape.width
         sink = gravity * float(half_pair["pair_mass"] / half_pair["stiffness"])
-        if sink > 0.5 * width:
-            longest = _below(h * math.sqrt(0.5 * width / sink))
+        if sink > _DEEPEST * width:
+            longest = _below(h * math.sqrt(_DEEPEST * width / sink))
             raise ValueError(
                 f"Fidelity.substep {h:g} s is too long for {scene.solid_names[i]}, which is "
                 f"{width:g} m wide and would sink by {sink:.3g} m at rest: use at most {longest} "

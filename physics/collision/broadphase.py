@@ -17,6 +17,10 @@ from physics.model.features import cached_by_features
 from physics.model.lanes import count_slots
 from physics.scene.shapes import PLANE
 
+# fraction of the skin; a list with less than that left is renewed when a collision step starts, in
+# all lanes at once rather than one by one within it
+_RENEWAL = 0.5
+
 
 @cached_by_features
 def make_search_half_pair(features):
@@ -101,7 +105,7 @@ def make_broadphase(features):
     def broadphase(model, state, workspace, g, starts_collision_step):
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
-            least, skin = 0.5 if starts_collision_step else 0.0, half_pair.skin
+            least, skin = _RENEWAL if starts_collision_step else 0.0, half_pair.skin
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
             if half_pair.kind == PLANE:
                 bound_motion_over_plane(owner, live.relative_motion)

@@ -16,9 +16,10 @@ from physics.scene.shapes import PARTICLES
 
 # cosine of the angle between normals of the same face, at least
 _ALIKE = 0.99
-# fraction of the skin by which a point must be deeper to be preferred for that alone, and fraction
-# of the squared span that a triangle's area must exceed
-_DEEPER, _FLAT = 0.1, 0.05
+# fraction of the skin by which a point must be deeper to be preferred for that alone
+_DEEPER = 0.1
+# fraction of the squared span that a triangle's area must exceed
+_SLIMMEST = 0.05
 
 
 @stage
@@ -81,7 +82,7 @@ def _span(manifold, n, face, deepest, skin, x, y, z):
     first, far = _farthest(manifold, n, face, x, y, z, low)
     p, normal = manifold[first].position, manifold[deepest].normal
     second, far = _farthest(manifold, n, face, p[0], p[1], p[2], math.inf)
-    least = _FLAT * far
+    least = _SLIMMEST * far
     third, fourth, most, fewest = -1, -1, least, -least
     for j in range(n):
         if manifold[j].face == face:

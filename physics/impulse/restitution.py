@@ -30,9 +30,9 @@ from physics.impulse.point_impulses import (
 from physics.model.features import cached_by_features
 from physics.motion.drives import make_finger_velocity_coupling
 
-# Sweeps end when none has changed a velocity by more than this fraction of the fastest approach, or
-# after so many
-TOLERANCE, MAX_SWEEPS = 1e-6, 64
+# Sweeps end when none has changed a velocity by more than this fraction of the fastest approach
+TOLERANCE = 1e-6
+MAX_SWEEPS = 64
 
 
 @stage

@@ -25,9 +25,10 @@ _CUBE_ROCKING = 9.0 / 8.0
 # contact_resolution (1 - softness). Damping that ends a landing within one step is too strong for
 # rocking that is faster than the landing: the body would gain energy (docs/decisions)
 _SLIM_RESTITUTION = 0.24
-# Impulse law: damping ratio of a soft contact, and the number of steps of free fall whose speed
-# counts as rest
-SOFT_DAMPING, REST_STEPS = 1.0, 4.0
+# Impulse law: damping ratio of a soft contact
+SOFT_DAMPING = 1.0
+# Impulse law: number of steps of free fall whose speed counts as rest
+REST_STEPS = 4.0
 
 
 def _of_solids(bodies: Array, others: list[float]) -> Array:

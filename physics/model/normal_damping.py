@@ -13,6 +13,11 @@ Array = np.ndarray
 _LEAST_RESTITUTION = 5e-4
 
 
+# damping of a body at rest, over critical. With critical damping a flat or a tall block, which
+# rocks faster than it bobs, would chatter and creep
+REST_DAMPING = 0.5
+
+
 def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
     """Root of an increasing function, to round-off."""
     for _ in range(200):
@@ -98,13 +103,12 @@ def damping_coefficient(restitution: float, law: str) -> float:
 
 
 def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:
-    """Lower bound of the impact speed, m/s: it damps a body at rest at half of critical.
+    """Lower bound of the impact speed, m/s: it damps a body at rest by REST_DAMPING.
 
     Args:
         damping: coefficient of the law, of any number of contacts.
         gravity: m/s^2.
         omega: rad/s, natural frequency of each contact.
     """
-    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega. With critical damping a
-    # flat or a tall block, which rocks faster than it bobs, would chatter and creep
-    return np.maximum(damping * gravity / omega, 1e-9)
+    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega
+    return np.maximum(damping * gravity / (2.0 * REST_DAMPING * omega), 1e-9)

@@ -34,9 +34,10 @@ from physics.scene.shapes import Box, Samples, Surface
 
 Array = np.ndarray
 
-# fractions of the compound's width: the distance below which two points count as one, and the
-# distance from a point at which `_useful` tests every direction for solid
-_SAME, _AROUND = 1e-6, 1e-3
+# fraction of the compound's width below which the distance of two points is round-off
+_SAME = 1e-6
+# fraction of that width: distance from a point at which `_useful` tests every direction for solid
+_AROUND = 1e-3
 # fraction of directions into solid from which on a sample is removed; at a flat face it is 0.5
 _FLAT = 0.45
 # largest product of inertia of principal axes, as a fraction of the tensor's trace

@@ -23,9 +23,10 @@ import numpy as np
 from physics.scene.part import Part
 from physics.scene.shapes import Box
 
-# tolerances: of the entries of the rotation between two boxes with parallel axes, and of the
-# separation or penetration of boxes that touch, as a fraction of the box's width
-_ASKEW, _SAME = 1e-6, 1e-6
+# round-off of the rotation between two boxes with parallel axes
+_ASKEW = 1e-6
+# round-off of the separation of boxes that touch, as a fraction of the box's width
+_SAME = 1e-6
 # shift of the face plane, as a fraction of the smaller width of the two boxes
 _ASIDE = 1e-3
 

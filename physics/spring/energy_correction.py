@@ -24,9 +24,6 @@ from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 
-# half steps of motion within which the centre is near the core; elsewhere nothing changes
-_NEAR = 8.0
-
 
 @stage
 def rotational_inverse_mass(jx, jy, jz, x, y, z, nx, ny, nz):
@@ -85,8 +82,7 @@ def make_energy_correction(features):
                 due = _square(radius - start) - _square(radius - end)
                 excess = _square(d + along) - _square(d - along) - due
                 square = sx * sx + sy * sy + sz * sz
-                near = _square(middle) < _NEAR * _NEAR * square
-                acts = near & (d > 0.0) & (excess > 0.0) & (weight > 0.0)
+                acts = (d > 0.0) & (excess > 0.0) & (weight > 0.0)
                 if compound:
                     acts &= max(wx, max(wy, wz)) < math.inf  # hidden by another part
                 rotational = rotational_inverse_mass(
