@@ -19,7 +19,7 @@ import tomllib
 from collections import Counter, defaultdict
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.tables import Table, markdown, plain
@@ -34,15 +34,19 @@ def literals(source: str) -> list[tuple[str, float]]:
     """(function or name that is assigned, value) of the literals that need an entry."""
     tree = ast.parse(source)
     parents = {child: node for node in ast.walk(tree) for child in ast.iter_child_nodes(node)}
-    found = []
+    found: list[tuple[str, float]] = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        if isinstance(node, ast.Constant) and _is_number(node.value):
             chain: list[Any] = [node]
             while chain[-1] in parents:
                 chain.append(parents[chain[-1]])
             if not _needs_no_entry(chain):
                 found.append((_place(chain), node.value))
     return found
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return type(value) in (int, float)  # not a bool
 
 
 def _needs_no_entry(chain: list[Any]) -> bool:
