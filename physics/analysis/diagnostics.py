@@ -30,7 +30,7 @@ class Contacts(NamedTuple):
     Attributes:
         pair: [n, 2] indices of the two solids: bodies, then drives, then statics, in scene order.
         names: [n] names of the two solids, (first, second).
-        point: [n, 3] m, the middle of the overlap; on a ground, the sample's lowest point.
+        point: [n, 3] m, within the overlap, see `contact_point`.
         normal: [n, 3] unit vector from the second solid to the first.
         penetration: [n] m; negative where solids collided up to half a step before they touch.
         force: [n, 3] N on the first solid; the second feels the opposite. A collision of the

@@ -118,8 +118,9 @@ def make_begin_half_pair(features):
                 )
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
             known = weight if weight > 0.0 else 1.0
-            error = at(errors, i) * known * at(stiffness, i) * (h * h) / at(pair_mass, i)
-            relative.damping[i] = at(damping, i) * (1.0 - error)
+            square = known * at(stiffness, i) * (h * h) / at(pair_mass, i)
+            square = min(square, 4.0)  # beyond it no step is stable
+            relative.damping[i] = at(damping, i) * (1.0 - at(errors, i) * square)
             relative.inverse_mean_force[i] = weight / force if force > _LEAST_FORCE else 0.0
             relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
