@@ -9,6 +9,7 @@ links the optimised code, inlines it and optimises the whole again. Only the ker
 - the first of numba's two rounds of optimisation is left out. It prepares for the removal of
   reference counts, which these functions don't have, and simplifies loops before the second round
   vectorises them; the results are bitwise the same without it;
+- LLVM's passes over each function by itself are left out: those over the module repeat them;
 - passes that treat language features which kernels don't use are left out.
 
 docs/decisions/0015-linked-functions.md has the compile times.
