@@ -7,10 +7,12 @@ can only add time.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from benchmarks.report.tables import Cell, Table
 from benchmarks.report.timing import Side, take_turns
 from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
+from physics.reference.scenes import tilted_gravity
 from physics.scene.solids import Static
 from physics.scene.validation import Vector
 
@@ -57,6 +59,10 @@ def _wall() -> Scene:
     return Scene(scene.bodies, [*scene.statics, wall])
 
 
+def _slope() -> Scene:
+    return replace(_cube(), gravity=tilted_gravity(0.2))
+
+
 # name: the scene that it extends, scene, fidelity
 CASES: dict[str, tuple[str, Scene, Fidelity]] = {
     "ball flies": ("", _flying(Sphere(0.02), 0.0), Fidelity()),
@@ -70,6 +76,7 @@ CASES: dict[str, tuple[str, Scene, Fidelity]] = {
     "ball rests": ("ball rests, no friction", _ball(ROUGH), Fidelity()),
     "cube rests, no friction": ("cube flies and spins", _cube(SMOOTH), Fidelity()),
     "cube rests": ("cube rests, no friction", _cube(), Fidelity()),
+    "cube rests on a slope": ("cube rests", _slope(), Fidelity()),
     "slab rests": ("cube rests", _cube(shape=SLAB), Fidelity()),
     "cube rests, linear dashpot": ("cube rests", _cube(), Fidelity(damping="dashpot")),
     "cube and distant finger": ("cube rests", _cube(finger=(0.2, 0, 0.1)), Fidelity()),

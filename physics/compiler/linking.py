@@ -24,8 +24,6 @@ from numba.core.compiler import CompilerBase, Flags, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import Environment
 from numba.core.typed_passes import (
-    AnnotateTypes,
-    IRLegalization,
     NativeLowering,
     NoPythonBackend,
     NopythonTypeInference,
@@ -55,8 +53,6 @@ _BEFORE_LOWERING = (
     DeadBranchPrune,  # again: variables are now assigned once, so more conditions are constant
     NopythonTypeInference,
     PreLowerStripPhis,
-    IRLegalization,
-    AnnotateTypes,
 )
 
 
