@@ -9,7 +9,8 @@ links the optimised code, inlines it and optimises the whole again. Only the ker
 - the first of numba's two rounds of optimisation is left out. It prepares for the removal of
   reference counts, which these functions don't have, and simplifies loops before the second round
   vectorises them; the results are bitwise the same without it;
-- LLVM's passes over each function by itself are left out: those over the module repeat them;
+- of LLVM's passes over each function by itself only three are run: those over the module repeat
+  the others;
 - passes that treat language features which kernels don't use are left out.
 
 docs/decisions/0015-linked-functions.md has the compile times.
@@ -89,7 +90,20 @@ class _Library(JITCodeLibrary):
     """The code of a kernel, with the functions within it."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Left out: `_optimize_final_module` does all of it again."""
+        """Simplifies each new function, with three of the passes that numba runs here.
+
+        Those over the module do the rest. Without any, worlds with parameters of their own differed
+        in the last bit from worlds that have these built in.
+        """
+        ll_module.data_layout = self._codegen._data_layout
+        builder = self._codegen._pass_builder()
+        manager = llvm.create_new_function_pass_manager()
+        manager.add_sroa_pass()
+        manager.add_instruction_combine_pass()
+        manager.add_simplify_cfg_pass()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                manager.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         manager, builder = self._codegen._module_pass_manager()

@@ -38,11 +38,16 @@ def test_a_cube_carries_one_many_times_as_dense(ratio, fidelity):
 
 
 def test_the_wave_along_dominoes_converges_with_the_step():
-    speeds = [wave_speed(Fidelity(substep=h), stones=20) for h in (2e-3, 1e-3, 0.5e-3, 0.25e-3)]
-    errors = [abs(v / speeds[-1] - 1.0) for v in speeds[:-1]]
+    """A single wave scatters by 4 %: small changes decide which edge of a stone touches first."""
+
+    def speed(*steps):
+        return np.median([wave_speed(Fidelity(substep=h), stones=20) for h in steps])
+
+    fine = speed(0.2e-3, 0.25e-3, 0.3e-3)
+    errors = [abs(speed(h) / fine - 1.0) for h in (2e-3, 1e-3, 0.5e-3)]
     assert errors[0] < 0.25
     assert max(errors[1:]) < 0.03
-    assert 0.8 < speeds[-1] < 1.0
+    assert 0.8 < fine < 1.0
 
 
 @pytest.mark.parametrize(
