@@ -17,9 +17,10 @@ import numpy as np
 
 from physics.rotation import Array, from_rotation_vector, multiply
 
-# sine of the angle from gimbal lock below which yaw and roll can't be told apart, and below which
-# their rates are refused
-_LOCKED, _NEARLY_LOCKED = 1e-12, 1e-6
+# below this distance from gimbal lock, in rad, yaw and roll can't be told apart: round-off
+_LOCKED = 1e-12
+# below this cosine of the pitch their rates would have lost six digits
+_NEARLY_LOCKED = 1e-6
 
 
 def from_matrix(matrix: Array) -> Array:
