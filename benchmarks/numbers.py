@@ -8,7 +8,8 @@ Some literals need no entry:
 - 0, 1, 2 and 1/2 within an expression: neutral elements, powers, halves; but not where such a
   number is all that a name is set to;
 - subscripts, and arguments of `range`;
-- the integers 3, 4, 6 and 9: components of a vector, a quaternion, a symmetric tensor, a matrix;
+- the integers 3, 4, 6 and 9, likewise: components of a vector, a quaternion, a symmetric tensor, a
+  matrix;
 - physics/reference/: scenes and measures, which no law reads.
 """
 
@@ -57,13 +58,13 @@ def _needs_no_entry(chain: list[Any]) -> bool:
             return True
         if isinstance(outer, ast.Call) and getattr(outer.func, "id", "") == "range":
             return True
-    if type(value) is int and value in _COMPONENTS:
-        return True
     whole, holder = chain[0], chain[1]
     if isinstance(holder, ast.UnaryOp):
         whole, holder = chain[1], chain[2]
     alone = isinstance(holder, ast.Assign | ast.AnnAssign) and holder.value is whole
-    return value in _NEUTRAL and not (alone and _is_lasting(chain))
+    if alone and _is_lasting(chain):
+        return False
+    return value in _NEUTRAL or (type(value) is int and value in _COMPONENTS)
 
 
 def _is_lasting(chain: list[Any]) -> bool:

@@ -13,8 +13,7 @@ import numpy as np
 
 from physics import PRESETS, Box, World
 from physics.reference.measures import energy_gain, grazing, rebounds, slide, stand
-from physics.reference.scenes import landing_cube, settled, tower
-from physics.scene.scene import Scene
+from physics.reference.scenes import landing_cube
 
 SPEEDS = np.repeat([0.3, 1.0, 1.5, 3.0], 8)  # m/s
 ROD, PLATE = Box((0.005, 0.005, 0.02)), Box((0.02, 0.02, 0.004))
@@ -52,12 +51,6 @@ def bounce(preset: str) -> float:
     """Largest error of restitution of a ball, over all phases of the step."""
     ratios = [np.abs(rebounds(e, PRESETS[preset]) - e).max() for e in (0.25, 0.5, 0.75)]
     return float(max(ratios))
-
-
-def topple(preset: str) -> float:
-    """m/s, largest speed in a tower of three after a second."""
-    scene: Scene = tower(3)
-    return float(np.abs(settled(scene, preset).linear_velocity).max())
 
 
 COLUMNS: dict[str, Callable[[], float]] = {

@@ -24,6 +24,7 @@ import numpy as np
 
 from physics.analysis.contact_stiffness import inverse_masses, unit_stiffness
 from physics.model.features import Features
+from physics.model.normal_damping import REST_DAMPING
 from physics.model.rocking import face_contacts, largest_eigenvalue
 from physics.model.state import State
 from physics.model.tables import Model
@@ -50,8 +51,8 @@ def _normal(half_pair: Any, dashpot: bool, h: float) -> float:
         x = 2.0 * damping * h * math.sqrt(k / m)
         phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
         return 2.0 * damping * critical * h * phi + 0.5 * h * h * k
-    # a contact that lasts is damped half critically, see normal_damping.rest_speed
-    c = critical if damping > 0.0 else 0.0
+    # of a contact that lasts, see normal_damping.rest_speed
+    c = 2.0 * REST_DAMPING * critical if damping > 0.0 else 0.0
     x = h * c / m
     phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
     approaching = phi * h * c + 0.5 * h * h * k

@@ -3,7 +3,7 @@
 The contact point lies on the line from the sample along the normal, within the overlap. On the
 undeformed surface of a body friction would have the arm that a rigid body has. But both bodies need
 the same point, or angular momentum is not conserved. So their surfaces yield, each by a part of the
-overlap that is proportional to the other's mass: between equal bodies the point is in the middle.
+overlap that is proportional to its own mass: between equal bodies the point is in the middle.
 Grounds, statics and drives never rotate, so their arm doesn't matter, and only they yield.
 """
 

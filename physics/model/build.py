@@ -213,7 +213,10 @@ def _features(
         dashpot=not impulse and fidelity.damping == "dashpot" and len(model.half_pair) > 0,
         friction=friction,
         viscous=friction and fidelity.friction == "viscous",
-        slope=slope and friction and fidelity.friction == "coulomb" and not impulse,
+        slope=slope
+        and friction
+        and not impulse
+        and (fidelity.friction, fidelity.damping) == ("coulomb", "hunt_crossley"),
         resistance=resistance,
         rotation=rotation,
         plane=PLANE in kinds,

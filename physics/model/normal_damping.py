@@ -79,9 +79,9 @@ def damping_errors(restitution: Array, damping: Array, law: str) -> Array:
     if law == "dashpot":
         return np.zeros(e.shape)
     out, back = 1.0 + a, 1.0 - a * e
-    bounces = e < 1.0
+    bounces = e < 1.0 - 1e-6  # above, the difference below is round-off
     slope = np.where(bounces, 24.0 * (e * e * out - back), 1.0)
-    return np.where(bounces, (1.0 - e * e) * out * back / slope, 0.0)
+    return np.where(bounces, (1.0 - e * e) * out * back / slope, 1.0 / 12.0)
 
 
 @lru_cache(maxsize=4096)

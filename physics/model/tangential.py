@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from physics.scene.fidelity import Fidelity
+
 Array = np.ndarray
 
 
@@ -21,7 +23,8 @@ def shear_ratio(resolution: float) -> float:
     Args:
         resolution: rad per step, `Fidelity.contact_resolution`.
     """
-    return min(1.0, SHEAR_RATIO * max(1.0, (0.5 / resolution) ** 2))
+    # so that the shear oscillation advances by the same phase per step as at the default resolution
+    return min(1.0, SHEAR_RATIO * max(1.0, (Fidelity.contact_resolution / resolution) ** 2))
 
 
 def tangential_coefficients(

@@ -11,7 +11,7 @@ from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, PLANE
-from physics.spring.coulomb import friction_force, twist_torque, viscous_force, winding
+from physics.spring.coulomb import friction_force, is_set_down, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
 from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
 
@@ -144,7 +144,11 @@ def make_contact_loop(features, kind, report):
                             wound = winding(
                                 mass, mu, steep, fall[0, i], fall[1, i], fall[2, i], nx, ny, nz
                             )
-                        begun = persistence / shear_k if begins else 0.0
+                        along = ux * wound[0] + uy * wound[1] + uz * wound[2]
+                        set_down = begins & is_set_down(
+                            approach, along, gravity[0], gravity[1], gravity[2], h, wound
+                        )
+                        begun = 1.0 / shear_k if set_down else 0.0
                         sx += begun * wound[0]
                         sy += begun * wound[1]
                         sz += begun * wound[2]

@@ -33,9 +33,9 @@ spring is slack and gives too little friction until it is charged. With gravity 
 and g_n across it, and omega_t^2 = k_t/m, the spring has charged after the time t at which
 g_t (1 - cos omega_t t) = mu g_n. The body then has the speed g_t sin(omega_t t) / omega_t, and by
 Coulomb's law (g_t - mu g_n) t. At 30 degrees and mu = 0.5 it stays too fast by 0.4 g/omega_t.
-So a contact with a ground or static that begins where its weight alone makes the body slide begins
-wound up, to `_WOUND_UP` times the cone of the weight. It stays wound up while its shear points down
-the slope.
+So where a body is set down on a ground or static and its weight alone makes it slide, the contact
+begins wound up, to `_WOUND_UP` times the cone of the weight, and stays so while it pulls uphill. A
+body that lands, or slides up, begins with a slack spring, or friction would drive it.
 
 Resistance against rolling and spinning is the same law for the relative angular velocity across the
 normal and along it, with torques up to a length times the normal force. A rolling ball slows by
@@ -52,9 +52,12 @@ from physics.compiler.jit import stage
 # multiple of the cone, beyond the first, of damping that a lasting contact may remember. A body
 # that slides to rest needs several on its rear edge, which carries a third of the mean load
 _AT_REST = 10.0
-# As much as the cone can grow while a body is set down: when it drops from zero penetration it
+# As much as the cone of an edge grows while a cube is set down: dropped from zero penetration it
 # presses with up to twice its weight; all of this on an edge, which has 3/8 of a face's stiffness
-_WOUND_UP = 2.0 / (3.0 / 8.0)
+_WOUND_UP = 16.0 / 3.0
+# A body counts as set down if it approaches, and slides up, by at most the speed that gravity gives
+# it in so many steps. In the first step a cube already pitches, and its lower edge moves up
+_SET_DOWN = 2.0
 
 
 @stage
@@ -81,6 +84,24 @@ def winding(mass, mu, steep, gx, gy, gz, nx, ny, nz):
     cone = mu * max(-along, 0.0)
     factor = _WOUND_UP * mass * cone / down if down > steep * cone else 0.0
     return factor * gx, factor * gy, factor * gz
+
+
+@stage
+def is_set_down(approach, along, gx, gy, gz, h, wound):
+    """Whether a contact that begins is that of a body at rest, or that slides down.
+
+    Args:
+        approach: m/s.
+        along: N m/s, velocity times `wound`.
+        gx: m/s^2, gravity.
+        gy: likewise.
+        gz: likewise.
+        h: s.
+        wound: x y z in N, see `winding`.
+    """
+    wx, wy, wz = wound
+    limit = _SET_DOWN * h * math.sqrt(gx * gx + gy * gy + gz * gz)
+    return (approach <= limit) & (along >= -limit * math.sqrt(wx * wx + wy * wy + wz * wz))
 
 
 @stage

@@ -67,6 +67,13 @@ def test_restitution_is_what_was_asked_for_at_every_phase_of_touch(
     assert np.abs(errors).max() <= tolerance
 
 
+@pytest.mark.parametrize("below", [1e-16, 1e-12, 1e-7])
+def test_next_to_elastic_is_nearly_elastic(below):
+    np.testing.assert_allclose(
+        rebound(1.0 - below, "balanced"), rebound(1.0, "balanced"), atol=1e-6
+    )
+
+
 def test_without_restitution_a_ball_stays_down():
     assert np.abs(rebound(0.0, "accurate")).max() <= 1e-3 * SPEED
 

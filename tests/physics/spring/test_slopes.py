@@ -1,6 +1,7 @@
 """Bodies on slopes: set down, at rest, and launched up or across. Downhill is +x."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,3 +98,26 @@ def test_friction_turns_with_the_velocity_of_a_cube_that_slides_across_a_slope(p
     for _ in range(5000):
         u = u + h * acceleration(u + 0.5 * h * acceleration(u))
     np.testing.assert_allclose(world.linear_velocity[0, 0, :2], u, atol=error)
+
+
+@pytest.mark.parametrize("preset", SPRINGS)
+@pytest.mark.parametrize("speed", [0.05, 0.1, 0.2])
+def test_a_cube_that_lands_on_a_steep_slope_is_not_driven_uphill(speed, preset):
+    scene = slope("ground", CUBE, 30.0, linear_velocity=(0.0, 0.0, -speed))
+    world = World(scene, preset)
+    for _ in range(30):
+        world.advance(0.01)
+        assert world.linear_velocity[0, 0, 0] > -1e-3
+
+
+@pytest.mark.parametrize(
+    "fidelity", [*map(PRESETS.get, SPRINGS), replace(PRESETS["balanced"], damping="dashpot")]
+)
+@pytest.mark.parametrize("speed", [0.1, 0.3, 1.0])
+def test_a_cube_that_is_launched_up_a_slope_climbs_less_than_without_friction(speed, fidelity):
+    world = World(slope("ground", CUBE, 30.0, linear_velocity=(-speed, 0.0, 0.0)), fidelity)
+    highest = 0.0
+    for _ in range(100):
+        world.advance(0.005)
+        highest = max(highest, -float(world.position[0, 0, 0]))
+    assert highest < speed**2 / (2.0 * GRAVITY * math.sin(math.pi / 6))
