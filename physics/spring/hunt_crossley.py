@@ -15,16 +15,17 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
    1/(1 + x + x^2/2) keeps second order, and damping of any strength removes at most the whole
    approach speed.
 
-   L follows from the last step: L = f + m (u - u_before) / h, limited to 0 ... k d. Here f is what
-   the sample's force would be if it had the whole stiffness of the pair. The samples in contact
-   have a part W of it, so m is replaced by m / W, with the W of the last step. With the pair's
-   normal force F in that step, F / W is the mean of f over the samples in contact.
+   L follows from the last step: L = f + q m (u - u_before) / h, limited to 0 ... k d. Both f and L
+   are those of a sample scaled as if it had the whole stiffness of the pair; the true ones are these
+   times its weight. The samples in contact have together only the part W of the stiffness, so one
+   that had all of it would carry the mass m / W: q = 1 / W, with the W of the last step. With the
+   pair's normal force F in that step, F / W is the mean of f over the samples in contact.
    Where a cube lands on its corner, the samples around it have just touched and carry little yet.
-   With the factor 1 / W for all, the corner's load would be overestimated and it would rebound a
-   tenth too fast. So a sample whose f exceeds `_OVERLOADED` times the mean has the factor f / F
-   instead. So has a sample below the mean whose approach slows, u < u_before: it can't lose more
-   load than it carries. With either factor for all samples, the sum of weight times L would be
-   F + m (u - u_before) / h; with both it is slightly higher.
+   With q = 1 / W for all, the corner's load would be overestimated and it would rebound a tenth too
+   fast. So q = f / F where f exceeds `_OVERLOADED` times the mean of f. Also where f is below the
+   mean and the approach slows, u < u_before: L is then f times the same ratio for all such samples,
+   and a weakly loaded one can't lose more than it carries. With either q for all samples, the sum of
+   weight times L would be F + m (u - u_before) / h; with both it is slightly higher.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
@@ -42,7 +43,7 @@ import math
 
 from physics.compiler.jit import stage
 
-# a contact lasts up to this multiple of (load / m) / omega, or more, see the end
+# a contact counts as lasting while its impact speed is at most max(a, this) * (load / m) / omega
 _CALM = 2.0
 # multiple of the mean force from which a sample counts by its own force, see 1. Forces within a
 # leaning tower differ by less; if the rule applied there it would act as a softening spring
@@ -99,7 +100,8 @@ def hunt_crossley_force(
     rate = load_rate * (relative_force if by_force else 1.0)
     load = previous_force + rate * change if impact_speed != 0.0 else 0.0
     load = min(max(load, 0.0), k * max(penetration, 0.0))
-    # `floor`, a g / omega, supposes that the load is the weight; this is the same for the load
+    # `floor` is a g / omega: the load is taken to be the weight. `a * load_speed` is the same with
+    # the estimated load
     load_speed = load * math.sqrt(inverse_mass / k)
     v = max(speed, a * load_speed)
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
@@ -115,7 +117,7 @@ def hunt_crossley_force(
     force = force if touching & (force > 0.0) else 0.0
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
-    # a contact lasts up to the speed that its load gives in the time max(a, _CALM) / omega
+    # impact speed up to which a contact counts as lasting
     calm = max(floor, max(a, _CALM) * load_speed)
     return force, impact_speed, min(1.0, calm * divisor * inverse)
 
