@@ -16,7 +16,7 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
    approach speed.
 
    L follows from the last step: L = f + q m (u - u_before) / h, limited to 0 ... k d. Both f and L
-   are those of a sample scaled as if it had the whole stiffness of the pair; the true ones are these
+   are those of a sample scaled as if it had the pair's whole stiffness; the true ones are these
    times its weight. The samples in contact have together only the part W of the stiffness, so one
    that had all of it would carry the mass m / W: q = 1 / W, with the W of the last step. With the
    pair's normal force F in that step, F / W is the mean of f over the samples in contact.
@@ -24,8 +24,8 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
    With q = 1 / W for all, the corner's load would be overestimated and it would rebound a tenth too
    fast. So q = f / F where f exceeds `_OVERLOADED` times the mean of f. Also where f is below the
    mean and the approach slows, u < u_before: L is then f times the same ratio for all such samples,
-   and a weakly loaded one can't lose more than it carries. With either q for all samples, the sum of
-   weight times L would be F + m (u - u_before) / h; with both it is slightly higher.
+   and a weakly loaded one can't lose more than it carries. With either q for all samples, the sum
+   of weight times L would be F + m (u - u_before) / h; with both it is slightly higher.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
