@@ -70,7 +70,7 @@ def test_a_cube_below_the_friction_angle_comes_to_rest_where_it_is_set_down(pres
 
 @pytest.mark.parametrize("preset", SPRINGS)
 def test_a_cube_that_slides_up_a_steep_slope_turns_around(preset):
-    """Friction acts against the velocity. Where this turns, the spring is charged anew."""
+    """Friction acts against the velocity. Where this turns, the spring has to be charged again."""
     world = World(slope("ground", CUBE, 30.0, linear_velocity=(-1.0, 0.0, 0.0)), preset)
     steepness, cone = GRAVITY * math.sin(math.pi / 6), FRICTION * GRAVITY * math.cos(math.pi / 6)
     up, down = 1.0 / (steepness + cone), 0.5
