@@ -45,7 +45,7 @@ def test_what_is_a_literal_that_needs_an_entry(source, found):
     assert numbers.literals(source) == found
 
 
-@pytest.mark.parametrize("name", ["_OVERLOADED", "SHEAR_RATIO", "MAX_SWEEPS"])
+@pytest.mark.parametrize("name", ["REST_DAMPING", "SHEAR_RATIO", "MAX_SWEEPS"])
 def test_a_sweep_edits_a_copy(name, tmp_path):
     tree = sweep.edited(name, "1/3", tmp_path)
     edited = [
@@ -57,7 +57,7 @@ def test_a_sweep_edits_a_copy(name, tmp_path):
 
 
 def test_a_sweep_names_what_can_be_swept(tmp_path):
-    with pytest.raises(SystemExit, match=r"GRAVITY is not .* these can: .*OVERLOADED"):
+    with pytest.raises(SystemExit, match=r"GRAVITY is not .* these can: .*REST_DAMPING"):
         sweep.edited("GRAVITY", "1", tmp_path)
     with pytest.raises(SystemExit, match="'many' is not a number"):
-        sweep.edited("_CALM", "many", tmp_path)
+        sweep.edited("REST_DAMPING", "many", tmp_path)

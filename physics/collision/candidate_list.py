@@ -215,6 +215,7 @@ def make_search(features):
         live.remaining_skin[i] = remaining_skin
         if count == 0:
             live.previous_weight[i] = 0.0
+            live.previous_impact[i] = 0.0
             live.previous_normal_force[i] = 0.0
 
     return search

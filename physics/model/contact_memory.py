@@ -18,9 +18,9 @@ class ContactMemory(NamedTuple):
         normal_force: 1 row, N, of the last step.
         impact_speed: 1 row, m/s, see `hunt_crossley_force`. Spring law.
         approach: 1 row, m/s, in the last step. Spring law.
-        shear: 3 rows, m. Spring law: of the tangential spring. Impulse law: of the anchor.
+        shear: 3 rows. Spring law: N, force of the tangential spring. Impulse law: m, of the anchor.
         tangential_force: 3 rows, N, of the last step, in the surface's frame. Impulse law.
-        twist: 3 rows. Spring law: rad, of the spring against rolling and spinning. Impulse law:
+        twist: 3 rows. Spring law: N m, of the spring against rolling and spinning. Impulse law:
             N m, torque of the last step.
         face: 1 row, the face of a box through which the sample came in, see `box_distance`.
     """

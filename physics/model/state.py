@@ -32,7 +32,10 @@ HALF_PAIR_STATE = np.dtype(
     [
         ("count", "i8"),  # candidates
         ("remaining_skin", "f8"),  # m of relative motion for which the list stays complete
-        ("previous_weight", "f8"),  # weight of the samples in contact in the last step, of springs
+        # of springs, of the samples in contact in the last step: their weight, and the sum of
+        # force times impact speed, N m/s, of those that approach
+        ("previous_weight", "f8"),
+        ("previous_impact", "f8"),
     ],
     align=True,
 )

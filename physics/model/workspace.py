@@ -36,6 +36,10 @@ SOLID = np.dtype(
         # of the half-pair that is being worked on, see spring/contacts.py
         ("normal_force_sum", "f8", (LANES,)),  # N
         ("current_weight", "f8", (LANES,)),  # of the samples in contact
+        ("impact_sum", "f8", (LANES,)),  # N m/s
+        ("mean_impact_speed", "f8", (LANES,)),  # m/s
+        ("inverse_mass", "f8", (LANES,)),  # 1/kg, of the pair mass
+        ("speed_per_load", "f8", (LANES,)),  # m/s per N
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
@@ -56,6 +60,8 @@ HALF_PAIR_WORK = np.dtype(
         # of springs: weight in contact in the last step and in this one; and the N of this one
         ("previous_weight", "f8", (LANES,)),
         ("current_weight", "f8", (LANES,)),
+        ("previous_impact", "f8", (LANES,)),
+        ("current_impact", "f8", (LANES,)),
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
     ],

@@ -4,6 +4,8 @@ Everything is computed in the frame of the surface, where the surface is at rest
 candidate per lane, or zeros; the loop over lanes has no branch, so LLVM can vectorise it.
 """
 
+import math
+
 import numpy as np
 
 from physics.collision.contact_point import HIDDEN, make_touch
@@ -54,6 +56,8 @@ def make_contact_loop(features, kind, report):
         stiffness, damping, floors = constants.stiffness, relative.damping, constants.rest_speed
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
+        mean_impact_speeds, impact_sum = relative.mean_impact_speed, relative.impact_sum
+        inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight, updates = relative.current_weight, relative.updates_candidates
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
@@ -73,7 +77,7 @@ def make_contact_loop(features, kind, report):
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
                 share = at(overlap_share, i)
-                inverse_mass = 1.0 / mass
+                inverse_mass, speed_per_load = inverse_masses[i], speeds_per_load[i]
                 rx, ry, rz, nx, ny, nz, penetration, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals
                 )
@@ -92,7 +96,9 @@ def make_contact_loop(features, kind, report):
                         nz,
                     )
                     inverse_mass += rotational
-                    load_rate *= 1.0 / (1.0 + mass * rotational)
+                    lighter = 1.0 + mass * rotational
+                    load_rate *= 1.0 / lighter
+                    speed_per_load *= math.sqrt(lighter)
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -109,9 +115,11 @@ def make_contact_loop(features, kind, report):
                     a,
                     floor,
                     inverse_mass,
+                    speed_per_load,
                     h,
                     load_rate,
                     inverse_mean_forces[i],
+                    mean_impact_speeds[i],
                     impact_speed,
                     memory[FORCE, i],
                     memory[APPROACH, i],
@@ -148,10 +156,9 @@ def make_contact_loop(features, kind, report):
                         set_down = begins & is_set_down(
                             approach, along, gravity[0], gravity[1], gravity[2], h, wound
                         )
-                        begun = 1.0 / shear_k if set_down else 0.0
-                        sx += begun * wound[0]
-                        sy += begun * wound[1]
-                        sz += begun * wound[2]
+                        sx -= wound[0] if set_down else 0.0
+                        sy -= wound[1] if set_down else 0.0
+                        sz -= wound[2] if set_down else 0.0
                     if plane:
                         gx, gy, gz, sx, sy, sz = friction_force(
                             normal,
@@ -239,6 +246,7 @@ def make_contact_loop(features, kind, report):
                 torque[1, i] += rz * fx - rx * fz
                 torque[2, i] += rx * fy - ry * fx
                 normal_force_sum[i] += weight * normal
+                impact_sum[i] += weight * normal * max(impact_speed, 0.0)
                 if report:
                     out = rows[n]
                     out.penetration[i] = penetration

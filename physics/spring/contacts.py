@@ -4,6 +4,8 @@ Both solids feel opposite forces at the contact point, so momentum and angular m
 conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in s, 0 in a refresh.
 """
 
+import math
+
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.relative_frame import relative_gravity, relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
@@ -105,42 +107,55 @@ def make_begin_half_pair(features):
         pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
         damping, errors = half_pair.damping, half_pair.damping_error
         if compound:
-            sum_of_pair(model, workspace, k, relative.current_weight, relative.normal_force_sum)
+            sum_of_pair(
+                model, workspace, k,
+                relative.current_weight, relative.normal_force_sum, relative.impact_sum,
+            )  # fmt: skip
         for i in range(LANES):
-            rate = at(pair_mass, i) / h if h > 0.0 else 0.0
+            mass, k = at(pair_mass, i), at(stiffness, i)
+            rate = mass / h if h > 0.0 else 0.0
+            relative.inverse_mass[i] = 1.0 / mass
+            relative.speed_per_load[i] = 1.0 / math.sqrt(mass * k)
             if compound:  # until the loop these two fields are scratch, cleared below
                 weight, force = relative.current_weight[i], relative.normal_force_sum[i]
+                impact = relative.impact_sum[i]
             else:
                 both = half_pair.reverse >= 0
                 weight = live.previous_weight[i] + (other.previous_weight[i] if both else 0.0)
                 force = live.previous_normal_force[i] + (
                     other.previous_normal_force[i] if both else 0.0
                 )
+                impact = live.previous_impact[i] + (other.previous_impact[i] if both else 0.0)
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
             known = weight if weight > 0.0 else 1.0
-            square = known * at(stiffness, i) * (h * h) / at(pair_mass, i)
+            square = known * k * (h * h) / mass
             square = min(square, 4.0)  # beyond it no step is stable
             relative.damping[i] = at(damping, i) * (1.0 - at(errors, i) * square)
-            relative.inverse_mean_force[i] = weight / force if force > _LEAST_FORCE else 0.0
+            inverse = 1.0 / force if force > _LEAST_FORCE else 0.0
+            relative.inverse_mean_force[i] = weight * inverse
+            relative.mean_impact_speed[i] = impact * inverse
             relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
             relative.normal_force_sum[i] = 0.0
+            relative.impact_sum[i] = 0.0
 
     return begin_half_pair
 
 
 @stage
-def sum_of_pair(model, workspace, k, weight, force):
+def sum_of_pair(model, workspace, k, weight, force, impact):
     """Sums W and F of the last step over all half-pairs of a pair; compounds have several."""
     for i in range(LANES):
         weight[i] = workspace.half_pair[k].previous_weight[i]
         force[i] = workspace.half_pair[k].previous_normal_force[i]
+        impact[i] = workspace.half_pair[k].previous_impact[i]
     other = model.half_pair[k].next_in_pair
     while other != k:
         live = workspace.half_pair[other]
         for i in range(LANES):
             weight[i] += live.previous_weight[i]
             force[i] += live.previous_normal_force[i]
+            impact[i] += live.previous_impact[i]
         other = model.half_pair[other].next_in_pair
 
 
@@ -189,6 +204,7 @@ def make_contacts(features):
                 for i in range(LANES):
                     live.current_weight[i] = relative.current_weight[i]
                     live.current_normal_force[i] = relative.normal_force_sum[i]
+                    live.current_impact[i] = relative.impact_sum[i]
         # after all of them, because the half-pairs of a pair read the last step of each other
         updates_memory = workspace.lane[0].updates_memory
         for k in range(model.half_pair.shape[0]):
@@ -196,8 +212,10 @@ def make_contacts(features):
             if live.slots > 0:
                 # also makes the current normal force the previous one
                 record_contacts(model, state, workspace, g, k, live.current_normal_force, elapsed)
-                previous, current = live.previous_weight, live.current_weight
+                weight, impact = live.previous_weight, live.previous_impact
                 for i in range(LANES):
-                    previous[i] = current[i] if updates_memory[i] != 0 else previous[i]
+                    updates = updates_memory[i] != 0
+                    weight[i] = live.current_weight[i] if updates else weight[i]
+                    impact[i] = live.current_impact[i] if updates else impact[i]
 
     return contacts

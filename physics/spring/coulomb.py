@@ -1,13 +1,13 @@
 """Coulomb friction with history: the tangential spring of Cundall and Strack (1979).
 
-A contact remembers its shear xi. The trial force -k_t xi - c_t u is cut to the cone |f| <= mu N.
-Where it is cut, xi becomes the shear that gives the cut force at the present speed,
-xi = -(f + c_t u)/k_t (Luding 2008), so the force is continuous when sliding ends.
+A contact remembers the force s = -k_t xi of its shear xi. The trial force s - c_t u is cut to the
+cone |f| <= mu N. Where it is cut, s becomes the force that gives the cut one at the present speed,
+f + c_t u (Luding 2008), so the force is continuous when sliding ends.
 
 Contacts that collide and contacts that last differ in what they remember.
 
-- In a collision N starts at zero, so c_t u exceeds the cone and xi would point backwards. Such a
-  shear stores energy that no work has paid for, and returns it later. Contacts that collide
+- In a collision N starts at zero, so c_t u exceeds the cone and s would point forwards. Such a
+  spring stores energy that no work has paid for, and returns it later. Contacts that collide
   therefore have friction by damping alone, within the cone.
 - A body at rest and one that slides to rest need the shear spring. Contacts that last keep it.
 
@@ -49,8 +49,9 @@ import math
 
 from physics.compiler.jit import stage
 
-# multiple of the cone, beyond the first, of damping that a lasting contact may remember. A body
-# that slides to rest needs several on its rear edge, which carries a third of the mean load
+# Cones of damping, beyond the first, that a lasting contact may remember. The rear edge of a body
+# that slides to rest needs several, as it carries a third of the mean load. Without a limit, samples
+# with little load would pull in the direction of an earlier velocity where it turns
 _AT_REST = 10.0
 # As much as the cone of an edge grows while a cube is set down: dropped from zero penetration it
 # presses with up to twice its weight; all of this on an edge, which has 3/8 of a face's stiffness
@@ -117,7 +118,7 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wou
         c: N s/m, shear damping.
         mu: coefficient of friction.
         h: s.
-        sx: m, shear before this step, in the tangent plane.
+        sx: N, force of the shear spring before this step, in the tangent plane.
         sy: likewise.
         sz: likewise.
         persistence: 1 for a contact that lasts, falling to 0 for one that collides.
@@ -125,14 +126,12 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wou
             amount, even if that is more than the cone.
 
     Returns:
-        Force x y z in N, and shear x y z to remember in m.
+        Force x y z in N, and force x y z of the spring to remember in N.
     """
-    sx += h * ux
-    sy += h * uy
-    sz += h * uz
-    fx = -k * sx - c * ux
-    fy = -k * sy - c * uy
-    fz = -k * sz - c * uz
+    whole = k * h + c
+    fx = sx - whole * ux
+    fy = sy - whole * uy
+    fz = sz - whole * uz
     inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
     cut = min(1.0, limit * inverse)
@@ -151,11 +150,11 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wou
         fz *= remembered
     # forgotten after the step, not before: the trial force need not wait for the normal law
     lasting = persistence * persistence
-    back = -lasting / k if normal > 0.0 else 0.0
     damped = c * min(1.0, (1.0 + _AT_REST * lasting) * limit * inverse)
-    sx = back * (fx + damped * ux)
-    sy = back * (fy + damped * uy)
-    sz = back * (fz + damped * uz)
+    touches = normal > 0.0
+    sx = lasting * (fx + damped * ux) if touches else 0.0
+    sy = lasting * (fy + damped * uy) if touches else 0.0
+    sz = lasting * (fz + damped * uz) if touches else 0.0
     return rx, ry, rz, sx, sy, sz
 
 
@@ -184,12 +183,12 @@ def twist_torque(normal, wx, wy, wz, nx, ny, nz, k, c, rolling, spinning, h, tx,
         rolling: m, rolling resistance.
         spinning: m, spinning resistance.
         h: s.
-        tx: rad, twist before this step.
+        tx: N m, torque of the spring before this step.
         ty: likewise.
         tz: likewise.
 
     Returns:
-        Torque x y z in N m, and twist x y z to remember in rad.
+        Torque x y z in N m, and torque x y z of the spring to remember in N m.
     """
     spin, twist = wx * nx + wy * ny + wz * nz, tx * nx + ty * ny + tz * nz
     ax, ay, az, px, py, pz = friction_force(

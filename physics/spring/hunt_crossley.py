@@ -7,7 +7,14 @@ contact gives the restitution e:
 
     a (1 + e) = ln((1 + a) / (1 - a e)),
 
-which `physics.model.normal_damping` solves for a. In discrete time the law needs two details.
+which `physics.model.normal_damping` solves for a.
+
+Where samples touch one after the other, as those of a cube that lands on its corner, the force of
+all of them is K(d) (1 + a d'/v) if they have the same v, with a sum K(d) of their springs. The
+integral is then the same for any K(d), and so is e. So a sample that joins others that still
+approach takes over their impact speed: the mean of their v, each times its force.
+
+In discrete time the law needs two details.
 
 1. The rate relaxes within the step. Let u be the rate at which it starts, c = k d a / v,
    x = c h / m, and L the load that presses the contact from outside. Then m u' = L - k d - c u has
@@ -15,17 +22,22 @@ which `physics.model.normal_damping` solves for a. In discrete time the law need
    1/(1 + x + x^2/2) keeps second order, and damping of any strength removes at most the whole
    approach speed.
 
+   With L = 0 this is again a spring times 1 + a u/v, since phi depends on d alone. So e stays exact
+   however strong the relaxation, and whatever part of a face's stiffness touches.
+
    L follows from the last step: L = f + q m (u - u_before) / h, limited to 0 ... k d. Both f and L
    are those of a sample scaled as if it had the pair's whole stiffness; the true ones are these
-   times its weight. The samples in contact have together only the part W of the stiffness, so one
-   that had all of it would carry the mass m / W: q = 1 / W, with the W of the last step. With the
-   pair's normal force F in that step, F / W is the mean of f over the samples in contact.
-   Where a cube lands on its corner, the samples around it have just touched and carry little yet.
-   With q = 1 / W for all, the corner's load would be overestimated and it would rebound a tenth too
-   fast. So q = f / F where f exceeds `_OVERLOADED` times the mean of f. Also where f is below the
-   mean and the approach slows, u < u_before: L is then f times the same ratio for all such samples,
-   and a weakly loaded one can't lose more than it carries. With either q for all samples, the sum
-   of weight times L would be F + m (u - u_before) / h; with both it is slightly higher.
+   times its weight. With W the weight of the samples in contact in the last step, and F their
+   normal force, q is
+
+   - f / F for a contact that collides. Each sample then gets its part of what the whole pair
+     carries, which is nothing for a free body. By its weight, the corner of a cube would be given
+     a load because its neighbours, which have just touched, bear less: e would be 0.1 too high.
+   - 1 / W for a contact that lasts, as samples that had all of the stiffness would carry the mass
+     m / W. By force, the samples of a leaning tower would act as softening springs, and it falls.
+
+   A contact lasts if v is at most the speed L / (m omega), which a body reaches that is set down
+   under the load L without penetration; for a > 1, if v is at most the `floor` that belongs to L.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
@@ -43,12 +55,6 @@ import math
 
 from physics.compiler.jit import stage
 
-# a contact counts as lasting while its impact speed is at most max(a, this) * (load / m) / omega
-_CALM = 2.0
-# multiple of the mean force from which a sample counts by its own force, see 1. Forces within a
-# leaning tower differ by less; if the rule applied there it would act as a softening spring
-_OVERLOADED = 1.4
-
 
 @stage
 def hunt_crossley_force(
@@ -58,9 +64,11 @@ def hunt_crossley_force(
     a,
     floor,
     inverse_mass,
+    speed_per_load,
     h,
     load_rate,
     inverse_mean_force,
+    mean_impact_speed,
     impact_speed,
     previous_force,
     previous_approach,
@@ -75,9 +83,11 @@ def hunt_crossley_force(
         floor: m/s, lower bound of the impact speed.
         inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
             of the effective mass at its contact point, to which rotation contributes.
+        speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
         h: s.
         load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
+        mean_impact_speed: m/s, of the pair's samples that approached in the last step; else 0.
         impact_speed: m/s, remembered; negative while separating, 0 while apart.
         previous_force: N, f of the last step.
         previous_approach: m/s, of the last step.
@@ -92,18 +102,17 @@ def hunt_crossley_force(
     # mean penetration S/D, kept as a fraction: the whole force then takes one division
     S = penetration if deep else reach * reach
     D = 1.0 if deep else 4.0 * b
+    begins = impact_speed == 0.0
+    remembered = mean_impact_speed if begins else abs(impact_speed)
     turned_around = (impact_speed < 0.0) & (approach > 0.0)
-    speed = 0.0 if turned_around else abs(impact_speed)
-    speed = max(max(speed, approach), floor)
-    change, relative_force = approach - previous_approach, previous_force * inverse_mean_force
-    by_force = (relative_force > _OVERLOADED) | ((relative_force < 1.0) & (change < 0.0))
-    rate = load_rate * (relative_force if by_force else 1.0)
-    load = previous_force + rate * change if impact_speed != 0.0 else 0.0
-    load = min(max(load, 0.0), k * max(penetration, 0.0))
-    # `floor` is a g / omega: the load is taken to be the weight. `a * load_speed` is the same with
-    # the estimated load
-    load_speed = load * math.sqrt(inverse_mass / k)
-    v = max(speed, a * load_speed)
+    speed = max(max(0.0 if turned_around else remembered, approach), floor)
+    calm_per_load = max(a, 1.0) * speed_per_load
+    change = load_rate * (approach - previous_approach)
+    by_force = previous_force + change * (previous_force * inverse_mean_force)
+    lasts = speed <= max(floor, calm_per_load * by_force)
+    load = previous_force + change if lasts else by_force
+    load = 0.0 if begins else min(max(load, 0.0), k * max(penetration, 0.0))
+    v = max(speed, a * speed_per_load * load)
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
@@ -117,8 +126,7 @@ def hunt_crossley_force(
     force = force if touching & (force > 0.0) else 0.0
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
-    # impact speed up to which a contact counts as lasting
-    calm = max(floor, max(a, _CALM) * load_speed)
+    calm = max(floor, calm_per_load * load)
     return force, impact_speed, min(1.0, calm * divisor * inverse)
 
 
@@ -130,9 +138,11 @@ def dashpot_force(
     zeta,
     floor,
     inverse_mass,
+    speed_per_load,
     h,
     load_rate,
     inverse_mean_force,
+    mean_impact_speed,
     impact_speed,
     previous_force,
     previous_approach,
