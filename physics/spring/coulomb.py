@@ -50,8 +50,8 @@ import math
 from physics.compiler.jit import stage
 
 # Cones of damping, beyond the first, that a lasting contact may remember. The rear edge of a body
-# that slides to rest needs several, as it carries a third of the mean load. Without a limit, samples
-# with little load would pull in the direction of an earlier velocity where it turns
+# that slides to rest needs several, as it carries a third of the mean load. Without a limit
+# samples with little load would pull in the direction of an earlier velocity where it turns
 _AT_REST = 10.0
 # As much as the cone of an edge grows while a cube is set down: dropped from zero penetration it
 # presses with up to twice its weight; all of this on an edge, which has 3/8 of a face's stiffness
