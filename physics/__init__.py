@@ -6,6 +6,7 @@ from physics.model.features import Features
 from physics.scene.compound import Compound
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.fields import Attractor, Drag, PointSpring
 from physics.scene.material import Material
 from physics.scene.parameters import Parameters
 from physics.scene.part import Part
@@ -17,12 +18,14 @@ from physics.world import Snapshot, World
 
 __all__ = [
     "PRESETS",
+    "Attractor",
     "Body",
     "Box",
     "Capsule",
     "Compound",
     "ContactOverflow",
     "Contacts",
+    "Drag",
     "Drive",
     "Features",
     "Fidelity",
@@ -31,6 +34,7 @@ __all__ = [
     "Material",
     "Parameters",
     "Part",
+    "PointSpring",
     "Readout",
     "Scene",
     "SimulationDiverged",

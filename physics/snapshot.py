@@ -54,8 +54,10 @@ def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | N
             if limits is not None:
                 limits.check(new, np.flatnonzero(other))
             simulation.write_parameters(other, new)
-    for mine, theirs in zip(simulation.state, saved.state, strict=True):
-        mine[...] = theirs
+    simulation.set_wrenches(saved.state.wrench)
+    for name in saved.state._fields:
+        if name != "wrench":
+            getattr(simulation.state, name)[...] = getattr(saved.state, name)
     simulation.changed()
 
 

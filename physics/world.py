@@ -1,23 +1,24 @@
 """World: a scene, a fidelity and a count, ready to advance, read, write, save and restore."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from physics import snapshot
-from physics.analysis import diagnostics, energies, stability
+from physics.analysis import diagnostics, energies, field_limits, readouts, stability
 from physics.analysis.diagnostics import Contacts
 from physics.analysis.failures import failure
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
-from physics.model.features import Features
+from physics.model.features import NO_ROTATION, Features
 from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.scene.fidelity import Fidelity, resolve
 from physics.scene.parameters import Parameters, check_ranges, check_values
 from physics.scene.scene import Scene
-from physics.scene.validation import array, instance, integer, positive, text
+from physics.scene.validation import ZERO, array, instance, integer, positive, text
 from physics.snapshot import Snapshot
 from physics.step.readout import Readout
 from physics.step.simulation import Simulation, read_only
@@ -189,6 +190,46 @@ class World:
         make_move_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked), time)
         simulation.changed(poses=False)
 
+    def apply_wrench(
+        self,
+        force: Any = ZERO,
+        torque: Any = ZERO,
+        body: int | str | None = None,
+        point: Any = None,
+    ) -> None:
+        """Adds forces and torques that act on bodies during the next call of `advance`.
+
+        Constant in the world frame and over that call; calls add up. The first use compiles
+        a kernel with this feature.
+
+        Args:
+            force: N, world frame: [count, 3] for one body, or what broadcasts to it;
+                [count, bodies, 3] if `body` is None.
+            torque: N m, world frame, likewise.
+            body: index or name of a body; None: all of them.
+            point: m, world frame, where the force acts; the centre of mass if None. Of one body
+                [count, 3], else [count, bodies, 3]. The torque about the centre is that of the
+                present pose.
+
+        Raises:
+            TypeError, ValueError: no such body, a wrong shape, or a value that isn't finite; a
+                torque or point in a scene whose rotation isn't simulated. Nothing is then added.
+        """  # fmt: skip
+        simulation, bodies = self._simulation, len(self.scene.bodies)
+        chosen: slice | int = slice(None) if body is None else self.scene.body_index(body)
+        shape = (self.count, bodies, 3) if body is None else (self.count, 3)
+        new = np.zeros((self.count, bodies, 6))
+        push, turn = array("force", force, shape), array("torque", torque, shape)
+        if point is not None:
+            turn = turn + np.cross(array("point", point, shape) - self.position[:, chosen], push)
+        if simulation.features.rotation == NO_ROTATION and turn.any():
+            raise ValueError(
+                "torque and point must leave frictionless balls at rest without a torque, because "
+                "their rotation is not simulated; give a Body in the Scene friction or spin"
+            )
+        new[:, chosen, :3], new[:, chosen, 3:] = push, turn
+        simulation.add_wrench(new)
+
     # --- parameters ---------------------------------------------------------------------------
 
     @property
@@ -336,12 +377,65 @@ class World:
         """
         return self._simulation.readout()
 
+    def force(self) -> Array:
+        """[count, bodies, 3] N, net force on each body now: weight, fields, contacts, wrenches."""
+        self._refresh()
+        return readouts.force(self._simulation)
+
+    def torque(self) -> Array:
+        """[count, bodies, 3] N m, net torque on each body about its centre now, world frame."""
+        self._refresh()
+        return readouts.torque(self._simulation)
+
+    @property
+    def linear_acceleration(self) -> Array:
+        """[count, bodies, 3] m/s^2 of the centres of mass now, world frame."""
+        self._refresh()
+        return readouts.linear_acceleration(self._simulation)
+
+    @property
+    def angular_acceleration(self) -> Array:
+        """[count, bodies, 3] rad/s^2 now, world frame."""
+        self._refresh()
+        return readouts.angular_acceleration(self._simulation)
+
+    def inertia(self) -> Array:
+        """[count, bodies, 3, 3] kg m^2, inertia tensors about the centres in the world frame."""
+        return readouts.inertia(self._simulation)
+
+    def inertia_rate(self) -> Array:
+        """[count, bodies, 3, 3] kg m^2/s, time derivative of `inertia`."""
+        return readouts.inertia_rate(self._simulation)
+
+    def point_velocity(self, body: int | str, point: Any) -> Array:
+        """[count, 3] m/s, velocity of a point that is fixed to a body, world frame.
+
+        Args:
+            body: index or name.
+            point: in the body frame, m, [3] or [count, 3].
+        """
+        index = self.scene.body_index(body)
+        return readouts.point_velocity(
+            self._simulation, index, array("point", point, (self.count, 3))
+        )
+
+    def point_acceleration(self, body: int | str, point: Any) -> Array:
+        """[count, 3] m/s^2, acceleration of a point as of `point_velocity`, world frame."""
+        index = self.scene.body_index(body)
+        checked = array("point", point, (self.count, 3))
+        self._refresh()
+        return readouts.point_acceleration(self._simulation, index, checked)
+
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""
         return energies.kinetic_energy(self._simulation)
 
     def potential_energy(self) -> Array:
-        """[count] J of the bodies in the field of gravity, zero at the origin."""
+        """[count] J of the bodies: gravity, zero at the origin, springs to points and attractors.
+
+        An attractor's energy is zero infinitely far away for an exponent above 1, else at its
+        position; for an exponent of 1 it is strength * mass * ln(r / 1 m).
+        """
         return energies.potential_energy(self._simulation)
 
     def linear_momentum(self) -> Array:
@@ -425,7 +519,12 @@ class World:
         """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         self._refresh()
         simulation, index = self._simulation, self._world_index(world)
-        return stability.of_contacts(simulation.model, self.features, simulation.state, index)
+        contacts = stability.of_contacts(simulation.model, self.features, simulation.state, index)
+        fields, _ = field_limits.longest_step(self.scene, simulation.model.of_world(index))
+        # squared frequencies add at most
+        return (
+            1.0 / math.sqrt(1.0 / contacts**2 + 1.0 / fields**2) if fields < math.inf else contacts
+        )
 
     @property
     def nbytes(self) -> int:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from physics.analysis.field_energies import field_energy
 from physics.step.simulation import Simulation
 
 Array = np.ndarray
@@ -19,11 +20,11 @@ def kinetic_energy(simulation: Simulation) -> Array:
 
 
 def potential_energy(simulation: Simulation) -> Array:
-    """[count] J of the bodies in the field of gravity, zero at the origin."""
+    """[count] J of the bodies in gravity, springs to points and attractors."""
     weight = simulation.of_bodies("weight")
     axes = "wbi,bi->w" if weight.ndim == 2 else "wbi,wbi->w"
     position = simulation.state.dynamic["position"][:, : simulation.bodies]
-    return np.asarray(-np.einsum(axes, position, weight))
+    return field_energy(simulation) - np.einsum(axes, position, weight)
 
 
 def linear_momentum(simulation: Simulation) -> Array:

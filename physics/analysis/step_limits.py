@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from physics.analysis import stability
+from physics.analysis import field_limits, stability
 from physics.model.build import build
 from physics.model.features import Features
 from physics.model.pairs import spacing
@@ -25,10 +25,12 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
 
     Raises:
         ValueError: a Material.stiffness or Drive.frequency makes it unstable (the message names the
-            solid that limits it and the largest safe step), or a body would sink into the ground.
+            solid that limits it and the largest safe step), or a spring or drag of `Scene.fields`
+            does, or a body would sink into the ground.
     """
     _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
+    _check_fields(scene, fidelity, model)
     _check_stiffness(scene, fidelity, model, features)
 
 
@@ -133,6 +135,17 @@ def _check_servos(scene: Scene, fidelity: Fidelity, model: Model) -> None:
                 f"{_below(longest)} s; lower the frequency, shorten Fidelity.substep, or build the "
                 "World with allow_unstable=True"
             )
+
+
+def _check_fields(scene: Scene, fidelity: Fidelity, model: Model) -> None:
+    longest, limiting = field_limits.longest_step(scene, model)
+    if fidelity.substep > longest:
+        raise ValueError(
+            f"Scene.fields[{limiting}], {scene.fields[limiting]!r}, makes the substep of "
+            f"{fidelity.substep:g} s unstable: the largest safe step is {_below(longest)} s; lower "
+            "its stiffness or damping, shorten Fidelity.substep, or build the World with "
+            "allow_unstable=True"
+        )
 
 
 def _check_stiffness(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:

@@ -15,6 +15,7 @@ from physics.collision.relative_frame import relative_pose
 from physics.compiler.jit import LANES, at, stage
 from physics.model.features import cached_by_features
 from physics.model.lanes import count_slots
+from physics.model.state import STARTS_ANEW
 from physics.scene.shapes import PLANE
 
 # fraction of the skin; a list with less than that left is renewed when a collision step starts, in
@@ -138,7 +139,7 @@ def make_forget(features):
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
             for i in range(LANES):
-                if lane.needs_refresh[i]:
+                if lane.needs_refresh[i] == STARTS_ANEW:
                     # the state before may have diverged and left anything in a slot
                     for n in range(half_pair.slot_count):
                         clear(state.candidate[g, half_pair.first_slot + n], i)
@@ -148,6 +149,6 @@ def make_forget(features):
                     live.previous_impact[i] = 0.0
                     live.previous_normal_force[i] = 0.0
         for i in range(LANES):
-            lane.updates_memory[i] = lane.needs_refresh[i]
+            lane.updates_memory[i] = 1 if lane.needs_refresh[i] == STARTS_ANEW else 0
 
     return forget

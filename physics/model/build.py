@@ -12,6 +12,7 @@ from physics.model.coefficients import (
     half_pair_columns,
 )
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
+from physics.model.fields import field_rows
 from physics.model.pairs import Layout
 from physics.model.tables import (
     COMPOUND_PART,
@@ -24,6 +25,7 @@ from physics.model.tables import (
     Model,
 )
 from physics.scene.fidelity import Fidelity
+from physics.scene.fields import PointSpring
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
@@ -70,7 +72,7 @@ def build(
         for s in scene.statics
     ]
     static = np.array(poses, dtype=float).reshape(-1, 7)
-    model = Model(dynamic, half_pairs, parts, hidden, static, samples)
+    model = Model(dynamic, half_pairs, parts, hidden, static, samples, field_rows(scene))
     return model, _features(scene, fidelity, model, per_world_parameters)
 
 
@@ -192,6 +194,9 @@ def _features(
     friction = any(rough[row["owner"]] and rough[row["surface"]] for row in model.half_pair)
     # nothing rotates a ball without friction; if it has no spin either, it needs no orientation
     inert = all(isinstance(b.shape, Sphere) and not any(b.angular_velocity) for b in scene.bodies)
+    inert = inert and not any(
+        any(f.point) or any(f.to_point) for f in scene.fields if isinstance(f, PointSpring)
+    )
     moments = model.dynamic["inertia"][: len(scene.bodies)]
     # the impulse law needs every inertia tensor in the world frame anyway
     isotropic = bool(np.all(moments == moments[:, :1])) and not impulse
@@ -226,6 +231,8 @@ def _features(
         particles=PARTICLES in kinds,
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
+        fields=bool(scene.fields),
+        wrench=False,
         compound=len(model.compound_part) > 0,
         per_world_parameters=per_world_parameters,
     )

@@ -27,6 +27,8 @@ class Features(NamedTuple):
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         drives: the scene has drives.
         gripper: at least two of the drives are the fingers of a gripper.
+        fields: the scene has fields: springs to points, attractors, drag.
+        wrench: `World.apply_wrench` has been used.
         compound: at least one surface is a part of a compound and has its own frame.
         per_world_parameters: masses, materials and sizes can differ between worlds.
     """
@@ -45,6 +47,8 @@ class Features(NamedTuple):
     particles: bool
     drives: bool
     gripper: bool
+    fields: bool
+    wrench: bool
     compound: bool
     per_world_parameters: bool
 

@@ -28,6 +28,7 @@ def make_constants(features: Features):
                 model.hidden_face,
                 model.static,
                 model.sample,
+                model.field,
             )
         return model
 
@@ -71,7 +72,7 @@ def load(model, state, workspace, chosen, g):
         active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
         lane.active[i] = 1 if active else 0
         lane.updates_memory[i] = 1 if active else 0
-        lane.needs_refresh[i] = 1 if active and state.world[w].needs_refresh != 0 else 0
+        lane.needs_refresh[i] = state.world[w].needs_refresh if active else 0
         lane.start[i] = state.world[w].time if active else 0.0
         for m in range(model.dynamic.shape[0]):
             solid = workspace.solid[m]
@@ -162,13 +163,13 @@ def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
 def end_refresh(model, state, workspace, g):
     """Ends a refresh, which computes forces in the whole group: other lanes get theirs back.
 
-    `broadphase.make_forget` had limited `updates_memory` to the lanes that need the refresh; now it
-    holds for all active lanes again.
+    `broadphase.make_forget` had limited `updates_memory` to the lanes that start anew; now it holds
+    for all active lanes again.
     """
     lane = workspace.lane[0]
     for i in range(LANES):
         lane.updates_memory[i] = lane.active[i]
-        if lane.active[i] and not lane.needs_refresh[i]:
+        if lane.active[i] and lane.needs_refresh[i] == 0:
             for m in range(model.dynamic.shape[0]):
                 load_forces(state, workspace, g, m, i)
 

@@ -46,11 +46,15 @@ NORMAL_FORCE = 0  # N, sum of the normal forces of the last step
 FIRST_TOUCH = 1  # s, NaN before
 FIRST_POSITION = 2  # and the next two: m, position of the pair's first solid at that time
 
+STARTS_ANEW, NEW_FORCES = 1, 2  # values of STATUS.needs_refresh
+
 # one row per world
 STATUS = np.dtype(
     [
         ("time", "f8"),  # s
-        ("needs_refresh", "i4"),  # 1: set from outside, forces and candidates are out of date
+        # STARTS_ANEW: set from outside, forces and candidates are out of date. NEW_FORCES: only
+        # the forces are; contacts keep their memory
+        ("needs_refresh", "i4"),
         ("diverged", "i4"),  # 0, or 1 + index of the first non-finite dynamic body
         ("overflow", "i8"),  # 1: a half-pair had more candidates than room
     ],
@@ -87,6 +91,8 @@ class State(NamedTuple):
         world: [w] of STATUS.
         sample_id: [groups, slots, LANES] of each candidate; LANES worlds make a lane group.
         candidate: [groups, slots] of candidate_dtype.
+        wrench: [w, m, 6] force in N and torque in N m from the user, world frame; [0, m, 6] without
+            `features.wrench`.
     """
 
     dynamic: Array
@@ -95,6 +101,7 @@ class State(NamedTuple):
     world: Array
     sample_id: Array
     candidate: Array
+    wrench: Array
 
     @property
     def nbytes(self) -> int:
@@ -113,12 +120,13 @@ def allocate(model: Model, features: Features, count: int) -> State:
         world=np.zeros(count, dtype=STATUS),
         sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
         candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
+        wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
     )
     state.dynamic["orientation"][..., 3] = 1.0
     state.half_pair["remaining_skin"] = -1.0
     state.touch[...] = 0.0
     state.touch[:, FIRST_TOUCH] = np.nan
-    state.world["needs_refresh"] = 1
+    state.world["needs_refresh"] = STARTS_ANEW
     return state
 
 

@@ -141,6 +141,26 @@ HIDDEN_FACE = np.dtype(
     align=True,
 )
 
+# one row per field and, of a Drag on all bodies, per body
+POINT_SPRING, ATTRACTOR, DRAG = range(3)
+FIELD = np.dtype(
+    [
+        ("kind", "i8"),
+        ("body", "i8"),  # on which a spring or drag acts
+        ("other", "i8"),  # body at the other end of a spring, or -1
+        ("point", "f8", (3,)),  # m, where the spring is attached, in the body frame
+        ("to", "f8", (3,)),  # m, its other end, in the frame of `other`; or the attractor
+        ("stiffness", "f8"),  # N/m
+        ("damping", "f8"),  # N s/m, of a spring or linear drag
+        ("quadratic", "f8"),  # N s^2/m^2
+        ("rest_length", "f8"),  # m
+        ("strength", "f8"),  # m^(1 + exponent)/s^2
+        ("exponent", "f8"),
+        ("per_particle", "i8"),
+    ],
+    align=True,
+)
+
 
 class Model(NamedTuple):
     """The constants of a scene.
@@ -152,6 +172,7 @@ class Model(NamedTuple):
         hidden_face: [c] of HIDDEN_FACE.
         static: [s, 7] position in m and quaternion x y z w of the statics.
         sample: [4, p] x y z in m in the owner's frame at size 1, and weight.
+        field: [f] of FIELD.
     """
 
     dynamic: Array
@@ -160,6 +181,7 @@ class Model(NamedTuple):
     hidden_face: Array
     static: Array
     sample: Array
+    field: Array
 
     @property
     def nbytes(self) -> int:

@@ -30,6 +30,9 @@ SOLID = np.dtype(
         ("rotation", "f8", (9, LANES)),  # matrix, row by row: body frame to world frame
         ("velocity", "f8", (3, LANES)),  # m/s
         ("angular_velocity", "f8", (3, LANES)),  # rad/s
+        # at the time of the position, see motion/fields.py
+        ("present_velocity", "f8", (3, LANES)),  # m/s
+        ("present_angular_velocity", "f8", (3, LANES)),  # rad/s
         # of the last drift
         ("displacement", "f8", (3, LANES)),  # m
         ("rotation_bound", "f8", (LANES,)),  # m, upper bound of what rotation moved any point

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 from physics.scene.drives import Drive, Gripper
+from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
 from physics.scene.solids import Body, Ground, Static
 from physics.scene.validation import Vector, instance, vector
 
@@ -24,15 +25,18 @@ class Scene:
         statics: Ground or Static.
         drives: driven solids: Drive or Gripper.
         gravity: m/s^2.
+        fields: other forces on bodies: PointSpring, Attractor or Drag.
 
     Raises:
-        TypeError, ValueError: a field is of the wrong type; two solids have the same name.
+        TypeError, ValueError: an argument is of the wrong type; two solids have the same name; a
+            force on a body that isn't there.
     """
 
     bodies: Sequence[Body] = ()
     statics: Sequence[Ground | Static] = ()
     drives: Sequence[Drive | Gripper] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
+    fields: Sequence[Field] = ()
 
     def __post_init__(self) -> None:
         """Checks every field and turns the sequences into tuples."""
@@ -40,6 +44,7 @@ class Scene:
             "bodies": (Body,),
             "statics": (Ground, Static),
             "drives": (Drive, Gripper),
+            "fields": (PointSpring, Attractor, Drag),
         }
         for name, types in kinds.items():
             value = getattr(self, name)
@@ -54,6 +59,37 @@ class Scene:
         twice = [name for name, count in Counter(self.solid_names).items() if count > 1]
         if twice:
             raise ValueError(f"Scene: names of solids must be unique, got {twice[0]!r} twice")
+        for i, force in enumerate(self.fields):
+            self._check_field(f"Scene.fields[{i}]", force)
+
+    def _check_field(self, where: str, force: Field) -> None:
+        """Raises ValueError if a field acts on a body that isn't there, or ties one to itself."""
+        body, to = getattr(force, "body", None), getattr(force, "to", None)
+        for name, value in (("body", body), ("to", to if isinstance(to, int | str) else None)):
+            if value is not None:
+                self.body_index(value, f"{where}: {type(force).__name__}.{name}")
+        if (
+            isinstance(force, PointSpring)
+            and isinstance(force.to, int | str)
+            and self.body_index(force.to) == self.body_index(force.body)
+        ):
+            raise ValueError(f"{where}: PointSpring.to is the body itself, {to!r}")
+
+    def body_index(self, body: BodyName, field: str = "body") -> int:
+        """Index of a body that is given by index or name.
+
+        Raises:
+            ValueError: there is no such body; the message names `field` and lists the bodies.
+        """
+        names = self.solid_names[: len(self.bodies)]
+        if isinstance(body, str) and body in names:
+            return names.index(body)
+        if isinstance(body, int) and 0 <= body < len(names):
+            return body
+        listed = ", ".join(repr(name) for name in names) or "none"
+        raise ValueError(
+            f"{field} must be the name or index of a body, got {body!r}; there are: {listed}"
+        )
 
     @cached_property
     def driven_bodies(self) -> tuple[Drive, ...]:

@@ -9,7 +9,15 @@ from physics.compiler.jit import LANES, columns
 from physics.model.build import build, expand_per_world, write_per_world
 from physics.model.features import ISOTROPIC, Features
 from physics.model.pairs import Layout
-from physics.model.state import DYNAMIC_STATE, FIRST_TOUCH, NORMAL_FORCE, State, allocate
+from physics.model.state import (
+    DYNAMIC_STATE,
+    FIRST_TOUCH,
+    NEW_FORCES,
+    NORMAL_FORCE,
+    STARTS_ANEW,
+    State,
+    allocate,
+)
 from physics.model.tables import Model
 from physics.model.workspace import Workspace
 from physics.rotation import rotate, rotate_back
@@ -106,7 +114,7 @@ class Simulation:
         """Clears the hidden state of worlds: candidates, contact memories, forces, failures."""
         state = self.state
         self.changed()
-        state.world["needs_refresh"][worlds] = 1
+        state.world["needs_refresh"][worlds] = STARTS_ANEW
         state.world["diverged"][worlds] = 0
         touch = state.touch[..., : self.count]
         touch[:, NORMAL_FORCE, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
@@ -124,7 +132,45 @@ class Simulation:
         """
         if time != self._span:  # most frames have the same length
             self._span, self._substeps = time, substep_count(time, self.fidelity.substep)
-        return self._run(self._span / self._substeps, self._substeps, worlds)
+        pushed = self.state.wrench.size > 0 and self.state.wrench[worlds].any()
+        try:
+            return self._run(self._span / self._substeps, self._substeps, worlds)
+        finally:
+            if pushed:
+                self._end_wrenches(worlds)
+
+    def add_wrench(self, wrench: Array) -> None:
+        """Adds forces and torques [count, bodies, 6] that act during the next `advance`."""
+        self._compile_wrenches()
+        self.state.wrench[:, : self.bodies] += wrench
+        self._new_forces(np.asarray(wrench.any(axis=(1, 2))))
+
+    def _compile_wrenches(self) -> None:
+        """Adds the stage and the state of forces from the user, unless they are there."""
+        if not self.features.wrench:
+            self.features = self.features._replace(wrench=True)
+            rows = np.zeros((self.count, len(self.base.dynamic), 6))
+            self.state = self.state._replace(wrench=rows)
+            self._find_kernels()
+
+    def set_wrenches(self, wrench: Array) -> None:
+        """Sets the forces from the user to those of a state, which has none if it is empty."""
+        if wrench.size > 0:
+            self._compile_wrenches()
+        if self.features.wrench:
+            self.state.wrench[...] = wrench if wrench.size > 0 else 0.0
+
+    def _end_wrenches(self, worlds: Array) -> None:
+        """Clears the forces of the worlds of a mask: they hold for one call of `advance`."""
+        pushed = np.asarray(worlds & self.state.wrench.any(axis=(1, 2)))
+        self.state.wrench[pushed] = 0.0
+        self._new_forces(pushed)
+
+    def _new_forces(self, worlds: Array) -> None:
+        """Marks the forces of the worlds of a mask as out of date; contacts keep their memory."""
+        marks = self.state.world["needs_refresh"]
+        marks[worlds & (marks == 0)] = NEW_FORCES
+        self.changed(poses=False)
 
     def failed(self, field: str) -> list[int]:
         """Worlds of the last call whose status says "diverged" or "overflow"."""
@@ -138,12 +184,12 @@ class Simulation:
         """
         if self._fresh:
             return True
-        needs_refresh, well = self.state.world["needs_refresh"] != 0, True
-        if needs_refresh.any():
+        marks, well = self.state.world["needs_refresh"].copy(), True
+        if marks.any():
             try:
-                well = self._run(self.fidelity.substep, 0, needs_refresh)
+                well = self._run(self.fidelity.substep, 0, marks != 0)
             finally:
-                self.state.world["needs_refresh"][needs_refresh] = 1
+                self.state.world["needs_refresh"] = marks
         self._fresh = well
         return well
 

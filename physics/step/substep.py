@@ -7,6 +7,7 @@ from physics.impulse.solver import make_impulses
 from physics.model.features import Features, cached_by_features
 from physics.model.lanes import end_refresh
 from physics.motion.drives import make_drives, make_finger_coupling
+from physics.motion.fields import make_fields, make_present_velocities, make_wrenches
 from physics.motion.gravity import gravity
 from physics.motion.integrator import make_drift, make_kick
 from physics.motion.kinematics import make_kinematics
@@ -20,13 +21,17 @@ def make_forces(features: Features):
     Velocities are those of the last drift, which took `drifted` s, so they lag positions by half of
     it.
     """
-    drives = make_drives(features)
+    present_velocities, fields = make_present_velocities(features), make_fields(features)
+    wrenches, drives = make_wrenches(features), make_drives(features)
     couple_fingers = make_finger_coupling(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
 
     @sequence
     def forces(model, state, workspace, g, h, drifted, elapsed):
+        present_velocities(model, workspace, drifted)
         gravity(model, workspace)
+        fields(model, workspace)
+        wrenches(state, workspace, g)
         drives(model, workspace, drifted)
         contacts(model, state, workspace, g, h, drifted, elapsed)
         couple_fingers(model, workspace, drifted)
