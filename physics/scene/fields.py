@@ -100,7 +100,7 @@ class Attractor:
 
 @dataclass(frozen=True)
 class Drag:
-    """Friction of a body in a resting fluid: -(linear + quadratic * speed) * velocity, at its centre.
+    """Friction in a resting fluid: -(linear + quadratic * speed) * velocity, at the centre of mass.
 
     Args:
         linear: N s/m.
