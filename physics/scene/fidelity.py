@@ -1,7 +1,9 @@
 """Fidelity: the settings that trade speed for accuracy, and their presets."""
 
 from dataclasses import dataclass
+from typing import cast
 
+from physics.scene import saving
 from physics.scene.validation import choice, integer, number, positive
 
 LAWS = ("spring", "impulse")
@@ -85,6 +87,19 @@ class Fidelity:
             with_law = f" with law={self.law!r}" if name == "contact_resolution" else ""
             value = number(f"Fidelity.{name}{with_law}", getattr(self, name), low=low, high=high)
             object.__setattr__(self, name, value)
+
+    def to_json(self) -> str:
+        """The fidelity as JSON text, from which `from_json` builds an equal one."""
+        return saving.write(self, "fidelity")
+
+    @classmethod
+    def from_json(cls, text: str) -> "Fidelity":
+        """The fidelity of a text of `to_json`.
+
+        Raises:
+            TypeError, ValueError: no such text, or a bad value in it; the message names its place.
+        """
+        return cast(Fidelity, saving.read(text, "fidelity", (cls,)))
 
 
 PRESETS: dict[str, Fidelity] = {

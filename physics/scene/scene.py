@@ -8,12 +8,23 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
+from physics.scene import saving
+from physics.scene.compound import Compound
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
+from physics.scene.material import Material
+from physics.scene.part import Part
+from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
 from physics.scene.validation import Vector, instance, vector
+
+# classes of all objects that a scene is made of
+_PARTS = (
+    Body, Ground, Static, Drive, Gripper, Material, PointSpring, Attractor, Drag,
+    Sphere, Box, Capsule, Compound, Part,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -90,6 +101,19 @@ class Scene:
         raise ValueError(
             f"{field} must be the name or index of a body, got {body!r}; there are: {listed}"
         )
+
+    def to_json(self) -> str:
+        """The scene as JSON text, from which `from_json` builds an equal one."""
+        return saving.write(self, "scene")
+
+    @classmethod
+    def from_json(cls, text: str) -> "Scene":
+        """The scene of a text of `to_json`.
+
+        Raises:
+            TypeError, ValueError: no such text, or a bad value in it; the message names its place.
+        """
+        return cast(Scene, saving.read(text, "scene", (cls, *_PARTS)))
 
     @cached_property
     def driven_bodies(self) -> tuple[Drive, ...]:

@@ -97,6 +97,8 @@ def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
             f"{field} must be a quaternion (x, y, z, w) of non-zero length, got {value!r}; "
             "no rotation is (0, 0, 0, 1)"
         )
+    if abs(length - 1.0) < 1e-15:  # stays as it is, so that a saved one is read bit by bit
+        length = 1.0
     length = math.copysign(length, quaternion[3]) if quaternion[3] != 0.0 else length
     return tuple(x / length for x in quaternion)
 
