@@ -222,6 +222,7 @@ def _features(
         and friction
         and not impulse
         and (fidelity.friction, fidelity.damping) == ("coulomb", "hunt_crossley"),
+        lever=bool(np.any(model.half_pair["surface_inverse_inertia"])),
         resistance=resistance,
         rotation=rotation,
         plane=PLANE in kinds,

@@ -22,6 +22,7 @@ class Features(NamedTuple):
         friction: at least one pair has friction; adds the tangential law and its history.
         viscous: viscous friction, without history.
         slope: weight can press along a ground or static.
+        lever: a ball can touch a body beside its centre, which makes the effective mass smaller.
         resistance: at least one pair has rolling or spinning resistance.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
@@ -38,6 +39,7 @@ class Features(NamedTuple):
     friction: bool
     viscous: bool
     slope: bool
+    lever: bool
     resistance: bool
     rotation: int
     plane: bool

@@ -35,7 +35,7 @@ def make_contact_loop(features, kind, report):
     """Loop over the slots of a half-pair; with `report` it also writes a row for each candidate."""
     viscous, resistance = features.viscous, features.resistance
     friction = features.friction and not viscous
-    slope = features.slope
+    slope, lever = features.slope, features.lever
     normal_force = dashpot_force if features.dashpot else hunt_crossley_force
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
     touch = make_touch(features, kind)
@@ -83,7 +83,7 @@ def make_contact_loop(features, kind, report):
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
-                if not plane:
+                if lever and not plane:
                     rotational = rotational_inverse_mass(
                         at(inverse_inertia[0], i),
                         at(inverse_inertia[1], i),
