@@ -4,10 +4,10 @@ NAME is a tuned number of `python -m benchmarks.numbers`. Each value is written 
 engine, which is compiled and measured by itself; that takes a minute or two per value. Columns:
 largest errors of restitution, of a ball and of cubes that land on a face, an edge or a corner;
 largest gain of energy of slim solids in grazing impacts; error of the velocity of a cube that
-slides across a slope; error of a slide; drift of towers in 20 s, in m. At `solid`: the part of its
-time for which a ball stops bouncing too early; how fast a ball in the ground leaves it; the speed
-that is left when a tower lands; how much farther a spinning slab slides. All at `balanced`, or at
-the preset that is named.
+slides across a slope; slip of a box until it holds on a slope; error of a slide; drift of towers in
+20 s, in m. At `solid`: the part of its time for which a ball stops bouncing too early; how fast a
+ball in the ground leaves it; the speed that is left when a tower lands; how much farther a spinning
+slab slides. All at `balanced`, or at the preset that is named.
 """
 
 import argparse

@@ -68,6 +68,16 @@ def turn(preset: str) -> float:
     return float(np.abs(world.linear_velocity[0, 0, :2] - u).max())
 
 
+def slip(preset: str) -> float:
+    """Distance in m that a flat box with e = 0.9 slips in a second on a slope of 10 degrees."""
+    angle, material = np.radians(10.0), Material(0.5, 0.9)
+    body = Body(Box((0.03, 0.03, 0.01)), mass=0.1, position=(0, 0, 0.01), material=material)
+    gravity = (GRAVITY * np.sin(angle), 0.0, -GRAVITY * np.cos(angle))
+    world = World(Scene([body], [Ground(material)], gravity=gravity), preset)
+    world.advance(1.0)
+    return float(world.position[0, 0, 0])
+
+
 def ball(height: float, restitution: float) -> World:
     """A ball of 2 cm radius above or in the ground, at `solid`."""
     body = Body(
@@ -77,7 +87,7 @@ def ball(height: float, restitution: float) -> World:
 
 
 def settling() -> float:
-    """Part of the time in which a ball with e = 0.9 that falls by 5 cm should still bounce."""
+    """Part of its bouncing time that a ball with e = 0.9 loses by coming to rest too early."""
     world, last = ball(0.07, 0.9), 0.0
     for i in range(1500):
         world.advance(0.002)
@@ -103,7 +113,7 @@ def landing_tower() -> float:
 
 
 def spinning_slab() -> float:
-    """How much farther a thin slab on its long edge slides, spinning at 3 rad/s, than without."""
+    """How much farther a slab on its long edge slides, spinning at 3 rad/s, than v^2/(2 mu g)."""
     material = Material(0.5, 0.0)
     slab = Body(Box((0.05, 0.0015, 0.02)), mass=0.1, position=(0, 0, 0.02), material=material)
     world = World(Scene([slab], [Ground(material)]), "solid")
@@ -129,6 +139,7 @@ COLUMNS: dict[str, Callable[[], float]] = {
     "rod gains, fast": partial(gain, ROD, "fast"),
     "plate gains, fast": partial(gain, PLATE, "fast"),
     "turn, m/s": partial(turn, "balanced"),
+    "slip, m": partial(slip, "balanced"),
     "slide": partial(slide, (0.02, 0.02, 0.02), 0.5, partial(World, fidelity="balanced")),
     "3 at fast, m": partial(drift, 3, "fast"),
     "5 at balanced, m": partial(drift, 5, "balanced"),

@@ -48,7 +48,7 @@ class Solids:
         if not len(half_pairs):
             raise ValueError(
                 f"first and second must be solids that can touch, got {self._names[one]!r} and "
-                f"{self._names[other]!r}: a solid and itself, two statics, or the fingers of a "
-                "gripper can't"
+                f"{self._names[other]!r}: a solid and itself, two statics, a gripper's fingers, "
+                "and solids whose group and mask exclude each other can't"
             )
         return one, other, half_pairs

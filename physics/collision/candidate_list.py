@@ -216,6 +216,7 @@ def make_search(features):
         if count == 0:
             live.previous_weight[i] = 0.0
             live.previous_impact[i] = 0.0
+            live.previous_closing[i] = 0.0
             live.previous_normal_force[i] = 0.0
 
     return search

@@ -18,7 +18,7 @@ from physics.scene.shapes import PARTICLES
 _ALIKE = 0.99
 # fraction of the skin by which a point must be deeper to be preferred for that alone
 _DEEPER = 0.1
-# fraction of the squared span below which a triangle's area is round-off
+# fraction of the squared span below which twice a triangle's area is round-off
 _SLIMMEST = 1e-6
 
 

@@ -121,7 +121,7 @@ def make_store_forces(features):
                     fz += pz
                     px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
                     remember(memory, TANGENT, i, updates, px, py, pz)
-                    anchor = point.anchor  # creep, m; remembered as the spring law's shear is
+                    anchor = point.anchor  # creep, m
                     sx, sy, sz = rotated_back(Q, i, anchor[0, i], anchor[1, i], anchor[2, i])
                     remember(memory, SHEAR, i, updates, sx, sy, sz)
                 if resistance:

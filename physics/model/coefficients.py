@@ -28,7 +28,7 @@ _SLIM_RESTITUTION = 0.24
 # Impulse law: damping ratio of a soft contact
 SOFT_DAMPING = 1.0
 # Impulse law: number of steps of free fall whose speed counts as rest
-REST_STEPS = 2.0
+REST_STEPS = 4.0
 
 
 def _of_solids(bodies: Array, others: list[float]) -> Array:

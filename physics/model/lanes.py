@@ -114,6 +114,7 @@ def load(model, state, workspace, chosen, g):
                 half_pair.previous_normal_force[i] = state.touch[k, NORMAL_FORCE, w]
                 half_pair.previous_weight[i] = saved.previous_weight
                 half_pair.previous_impact[i] = saved.previous_impact
+                half_pair.previous_closing[i] = saved.previous_closing
             else:
                 half_pair.count[i] = 0
                 half_pair.remaining_skin[i] = 1e300
@@ -121,6 +122,7 @@ def load(model, state, workspace, chosen, g):
                 half_pair.previous_normal_force[i] = 0.0
                 half_pair.previous_weight[i] = 0.0
                 half_pair.previous_impact[i] = 0.0
+                half_pair.previous_closing[i] = 0.0
     for k in range(model.half_pair.shape[0]):
         count_slots(workspace, k)
     return count
@@ -203,3 +205,4 @@ def store(model, state, workspace, g, i, time):
         state.touch[k, NORMAL_FORCE, w] = half_pair.previous_normal_force[i] if present else 0.0
         saved.previous_weight = half_pair.previous_weight[i]
         saved.previous_impact = half_pair.previous_impact[i]
+        saved.previous_closing = half_pair.previous_closing[i]

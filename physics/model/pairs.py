@@ -18,7 +18,7 @@ from physics.scene.material import Material
 from physics.scene.part import Part
 from physics.scene.scene import Scene
 from physics.scene.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
-from physics.scene.solids import Body, Ground, Static
+from physics.scene.solids import Body, Ground, Static, touch_each_other
 
 Array = np.ndarray
 Solid = Body | Drive | Static | Ground
@@ -178,7 +178,7 @@ def _half_pairs(
         assert not isinstance(a, Static | Ground)
         for j in range(i + 1, len(solids)):
             b = solids[j]
-            if (i, j) in fingers:
+            if (i, j) in fingers or not touch_each_other(a, b):
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)

@@ -32,10 +32,11 @@ HALF_PAIR_STATE = np.dtype(
     [
         ("count", "i8"),  # candidates
         ("remaining_skin", "f8"),  # m of relative motion for which the list stays complete
-        # of springs, of the samples in contact in the last step: their weight, and the sum of
-        # force times impact speed, N m/s, of those that approach
+        # of springs, of the samples in contact in the last step: their weight; and of those that
+        # approach the sums of force times impact speed and of force times rate, N m/s
         ("previous_weight", "f8"),
         ("previous_impact", "f8"),
+        ("previous_closing", "f8"),
     ],
     align=True,
 )

@@ -39,8 +39,10 @@ SOLID = np.dtype(
         # of the half-pair that is being worked on, see spring/contacts.py
         ("normal_force_sum", "f8", (LANES,)),  # N
         ("current_weight", "f8", (LANES,)),  # of the samples in contact
-        ("impact_sum", "f8", (LANES,)),  # N m/s
+        ("impact_sum", "f8", (LANES,)),  # N m/s, see `State.half_pair.previous_impact`
+        ("closing_sum", "f8", (LANES,)),  # N m/s, likewise
         ("mean_impact_speed", "f8", (LANES,)),  # m/s
+        ("impact_ratio", "f8", (LANES,)),  # of impact speed to rate
         ("inverse_mass", "f8", (LANES,)),  # 1/kg, of the pair mass
         ("speed_per_load", "f8", (LANES,)),  # m/s per N
         ("load_rate", "f8", (LANES,)),  # kg/s
@@ -65,6 +67,8 @@ HALF_PAIR_WORK = np.dtype(
         ("current_weight", "f8", (LANES,)),
         ("previous_impact", "f8", (LANES,)),
         ("current_impact", "f8", (LANES,)),
+        ("previous_closing", "f8", (LANES,)),
+        ("current_closing", "f8", (LANES,)),
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
     ],

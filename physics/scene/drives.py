@@ -5,7 +5,7 @@ from typing import Any
 
 from physics.scene.material import Material
 from physics.scene.shapes import Shape
-from physics.scene.solids import check_solid
+from physics.scene.solids import EVERY_GROUP, check_solid
 from physics.scene.validation import IDENTITY, ZERO, Vector, number, positive
 
 
@@ -27,6 +27,8 @@ class Drive:
         damping_ratio: of the servo; 1 is critical.
         material: its surface.
         name: see `Body`; None: "drive" and its index.
+        group: see `Body`.
+        mask: see `Body`.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type or out of range.
@@ -41,6 +43,8 @@ class Drive:
     damping_ratio: float = 1.0
     material: Material = field(default_factory=Material)
     name: str | None = None
+    group: int = 1
+    mask: int = EVERY_GROUP
 
     def __post_init__(self) -> None:
         """Checks every field."""
@@ -73,6 +77,8 @@ class Gripper:
         material: the fingers' surface.
         name: see `Body`; the fingers are then "name[0]" and "name[1]". None: "drive" and the
             index of each finger.
+        group: see `Body`.
+        mask: see `Body`.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type or out of range.
@@ -89,6 +95,8 @@ class Gripper:
     damping_ratio: float = 1.0
     material: Material = field(default_factory=Material)
     name: str | None = None
+    group: int = 1
+    mask: int = EVERY_GROUP
 
     def __post_init__(self) -> None:
         """Checks every field."""
@@ -109,6 +117,8 @@ class Gripper:
                 self.damping_ratio,
                 self.material,
                 None if self.name is None else f"{self.name}[{finger}]",
+                self.group,
+                self.mask,
             )
             for finger, side in enumerate((-1.0, 1.0))
         )

@@ -28,7 +28,7 @@ class Fidelity:
         damping: damping of the spring law. "hunt_crossley": the force is continuous at first
             contact, and restitution does not depend on when within a substep contact begins.
             "dashpot": linear damping, for comparison. The impulse law accepts the default only.
-        friction: "coulomb": static and sliding friction; each contact stores its shear. "viscous":
+        friction: "coulomb": static and sliding friction; each contact has a spring. "viscous":
             force proportional to the slip velocity, up to the same limit; it costs least but cannot
             hold a body at rest. The impulse law accepts "coulomb" only.
         substep: s, longest step of the integrator.

@@ -11,12 +11,15 @@ from physics.scene.validation import (
     ZERO,
     Vector,
     instance,
+    integer,
     number,
     positive,
     text,
     unit_quaternion,
     vector,
 )
+
+EVERY_GROUP = 2**32 - 1  # a mask with all bits
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class Body:
         material: its surface.
         name: for `World.index`, error messages and contact reports; unique in a scene. None: "body"
             and its index.
+        group: bits of the groups that it belongs to, see `touch_each_other`.
+        mask: bits of the groups that it touches.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type or out of range.
@@ -48,6 +53,8 @@ class Body:
     angular_velocity: Vector = ZERO
     material: Material = field(default_factory=Material)
     name: str | None = None
+    group: int = 1
+    mask: int = EVERY_GROUP
 
     def __post_init__(self) -> None:
         """Checks every field and computes the mass."""
@@ -75,6 +82,8 @@ class Static:
         orientation: quaternion x, y, z, w; it is normalised, w >= 0.
         material: its surface.
         name: see `Body`; None: "static" and its index.
+        group: bits of the groups that it belongs to, see `touch_each_other`.
+        mask: bits of the groups that it touches.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type or out of range.
@@ -85,6 +94,8 @@ class Static:
     orientation: Vector = IDENTITY
     material: Material = field(default_factory=Material)
     name: str | None = None
+    group: int = 1
+    mask: int = EVERY_GROUP
 
     def __post_init__(self) -> None:
         """Checks every field."""
@@ -99,6 +110,8 @@ class Ground:
         material: its surface.
         height: m.
         name: see `Body`; None: "static" and its index.
+        group: bits of the groups that it belongs to, see `touch_each_other`.
+        mask: bits of the groups that it touches.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type or not finite.
@@ -107,12 +120,14 @@ class Ground:
     material: Material = field(default_factory=Material)
     height: float = 0.0
     name: str | None = None
+    group: int = 1
+    mask: int = EVERY_GROUP
 
     def __post_init__(self) -> None:
         """Checks every field."""
         instance("Ground.material", self.material, Material)
         object.__setattr__(self, "height", number("Ground.height", self.height))
-        check_name(self)
+        check_labels(self)
 
 
 def check_solid(solid: Any) -> None:
@@ -127,10 +142,20 @@ def check_solid(solid: Any) -> None:
     object.__setattr__(solid, "position", vector(f"{kind}.position", solid.position))
     orientation = unit_quaternion(f"{kind}.orientation", solid.orientation)
     object.__setattr__(solid, "orientation", orientation)
-    check_name(solid)
+    check_labels(solid)
 
 
-def check_name(solid: Any) -> None:
-    """Raises TypeError or ValueError unless a solid's name is None or a text."""
+def touch_each_other(a: Any, b: Any) -> bool:
+    """Whether the filters of two solids let them touch: each has a group in the other's mask."""
+    return bool(a.group & b.mask and b.group & a.mask)
+
+
+def check_labels(solid: Any) -> None:
+    """Raises TypeError or ValueError unless a solid's name is None or a text, and its bits fit."""
+    for name in ("group", "mask"):
+        field = f"{type(solid).__name__}.{name}"
+        bits = integer(field, getattr(solid, name), low=0)
+        if bits > EVERY_GROUP:
+            raise ValueError(f"{field} must be at most {EVERY_GROUP}, 32 bits, got {bits}")
     if solid.name is not None:
         text(f"{type(solid).__name__}.name", solid.name)

@@ -56,7 +56,8 @@ def make_contact_loop(features, kind, report):
         stiffness, damping, floors = constants.stiffness, relative.damping, constants.rest_speed
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
-        mean_impact_speeds, impact_sum = relative.mean_impact_speed, relative.impact_sum
+        mean_impact_speeds, impact_ratios = relative.mean_impact_speed, relative.impact_ratio
+        impact_sum, closing_sum = relative.impact_sum, relative.closing_sum
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight, updates = relative.current_weight, relative.updates_candidates
@@ -120,6 +121,7 @@ def make_contact_loop(features, kind, report):
                     load_rate,
                     inverse_mean_forces[i],
                     mean_impact_speeds[i],
+                    impact_ratios[i],
                     impact_speed,
                     memory[FORCE, i],
                     memory[APPROACH, i],
@@ -246,7 +248,9 @@ def make_contact_loop(features, kind, report):
                 torque[1, i] += rz * fx - rx * fz
                 torque[2, i] += rx * fy - ry * fx
                 normal_force_sum[i] += weight * normal
-                impact_sum[i] += weight * normal * max(impact_speed, 0.0)
+                closing_force = weight * normal if approach > 0.0 else 0.0
+                impact_sum[i] += closing_force * impact_speed
+                closing_sum[i] += closing_force * approach
                 if report:
                     out = rows[n]
                     out.penetration[i] = penetration

@@ -84,15 +84,16 @@ def make_begin_half_pair(features):
 
     @stage
     def begin_half_pair(model, workspace, k, h, relative):
-        """Prepares the estimate of the load on each sample, see spring/hunt_crossley.py.
+        """Prepares what the samples read of their pair, see spring/hunt_crossley.py.
 
         The load rate m / (W h) turns a change of velocity into a force; W / F is the inverse of the
-        mean force.
+        mean force. Also the mean impact speed of the last step (samples that separate count as 0)
+        and the ratio of impact speed to rate, which samples that join take over.
 
         Also corrects the damping coefficient for (omega h)^2 W, see model/normal_damping.py.
 
         m is the pair mass and h the step. W is the sum of the weights of the samples that were in
-        contact in the last step, over all half-pairs of the pair, and F their normal force. Both
+        contact in the last step, over all half-pairs of the pair, and F their normal force. The
         results are zero where nothing was in contact. Candidates keep their memory in a refresh
         (h = 0) and in lanes that aren't advanced. All of it is written to `relative`, one array,
         because LLVM checks before every run of the loop that its arrays don't overlap.
@@ -109,16 +110,17 @@ def make_begin_half_pair(features):
         if compound:
             sum_of_pair(
                 model, workspace, k,
-                relative.current_weight, relative.normal_force_sum, relative.impact_sum,
+                relative.current_weight, relative.normal_force_sum,
+                relative.impact_sum, relative.closing_sum,
             )  # fmt: skip
         for i in range(LANES):
-            mass, k = at(pair_mass, i), at(stiffness, i)
+            mass, spring = at(pair_mass, i), at(stiffness, i)
             rate = mass / h if h > 0.0 else 0.0
             relative.inverse_mass[i] = 1.0 / mass
-            relative.speed_per_load[i] = 1.0 / math.sqrt(mass * k)
-            if compound:  # until the loop these two fields are scratch, cleared below
+            relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)
+            if compound:  # until the loop these four fields are scratch, cleared below
                 weight, force = relative.current_weight[i], relative.normal_force_sum[i]
-                impact = relative.impact_sum[i]
+                impact, closing = relative.impact_sum[i], relative.closing_sum[i]
             else:
                 both = half_pair.reverse >= 0
                 weight = live.previous_weight[i] + (other.previous_weight[i] if both else 0.0)
@@ -126,29 +128,33 @@ def make_begin_half_pair(features):
                     other.previous_normal_force[i] if both else 0.0
                 )
                 impact = live.previous_impact[i] + (other.previous_impact[i] if both else 0.0)
+                closing = live.previous_closing[i] + (other.previous_closing[i] if both else 0.0)
             relative.load_rate[i] = rate / weight if weight > 0.0 else 0.0
             known = weight if weight > 0.0 else 1.0
-            square = known * k * (h * h) / mass
+            square = known * spring * (h * h) / mass
             square = min(square, 4.0)  # beyond it no step is stable
             relative.damping[i] = at(damping, i) * (1.0 - at(errors, i) * square)
             inverse = 1.0 / force if force > _LEAST_FORCE else 0.0
             relative.inverse_mean_force[i] = weight * inverse
             relative.mean_impact_speed[i] = impact * inverse
+            relative.impact_ratio[i] = impact / closing if closing > _LEAST_FORCE else 0.0
             relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
             relative.normal_force_sum[i] = 0.0
             relative.impact_sum[i] = 0.0
+            relative.closing_sum[i] = 0.0
 
     return begin_half_pair
 
 
 @stage
-def sum_of_pair(model, workspace, k, weight, force, impact):
-    """Sums W and F of the last step over all half-pairs of a pair; compounds have several."""
+def sum_of_pair(model, workspace, k, weight, force, impact, closing):
+    """Adds up what the half-pairs of a pair had in the last step; compounds have several."""
     for i in range(LANES):
         weight[i] = workspace.half_pair[k].previous_weight[i]
         force[i] = workspace.half_pair[k].previous_normal_force[i]
         impact[i] = workspace.half_pair[k].previous_impact[i]
+        closing[i] = workspace.half_pair[k].previous_closing[i]
     other = model.half_pair[k].next_in_pair
     while other != k:
         live = workspace.half_pair[other]
@@ -156,6 +162,7 @@ def sum_of_pair(model, workspace, k, weight, force, impact):
             weight[i] += live.previous_weight[i]
             force[i] += live.previous_normal_force[i]
             impact[i] += live.previous_impact[i]
+            closing[i] += live.previous_closing[i]
         other = model.half_pair[other].next_in_pair
 
 
@@ -205,6 +212,7 @@ def make_contacts(features):
                     live.current_weight[i] = relative.current_weight[i]
                     live.current_normal_force[i] = relative.normal_force_sum[i]
                     live.current_impact[i] = relative.impact_sum[i]
+                    live.current_closing[i] = relative.closing_sum[i]
         # after all of them, because the half-pairs of a pair read the last step of each other
         updates_memory = workspace.lane[0].updates_memory
         for k in range(model.half_pair.shape[0]):
@@ -212,10 +220,15 @@ def make_contacts(features):
             if live.slots > 0:
                 # also makes the current normal force the previous one
                 record_contacts(model, state, workspace, g, k, live.current_normal_force, elapsed)
-                weight, impact = live.previous_weight, live.previous_impact
+                weight, impact, closing = (
+                    live.previous_weight,
+                    live.previous_impact,
+                    live.previous_closing,
+                )
                 for i in range(LANES):
                     updates = updates_memory[i] != 0
                     weight[i] = live.current_weight[i] if updates else weight[i]
                     impact[i] = live.current_impact[i] if updates else impact[i]
+                    closing[i] = live.current_closing[i] if updates else closing[i]
 
     return contacts

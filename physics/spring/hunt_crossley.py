@@ -12,7 +12,9 @@ which `physics.model.normal_damping` solves for a.
 Where samples touch one after the other, as those of a cube that lands on its corner, the force of
 all of them is K(d) (1 + a d'/v) if they have the same v, with a sum K(d) of their springs. The
 integral is then the same for any K(d), and so is e. So a sample that joins others that still
-approach takes over their impact speed: the mean of their v, each times its force.
+approach takes over their ratio v/d', the mean with the forces as weights, but no more than their
+mean v. Where all of them move alike this is their v; one that comes slowly from another side, as a
+wall does that a body on the floor touches, keeps its own.
 
 In discrete time the law needs two details.
 
@@ -36,8 +38,8 @@ In discrete time the law needs two details.
    - 1 / W for a contact that lasts, as samples that had all of the stiffness would carry the mass
      m / W. By force, the samples of a leaning tower would act as softening springs, and it falls.
 
-   A contact lasts if v is at most the speed L / (m omega), which a body reaches that is set down
-   under the load L without penetration; for a > 1, if v is at most the `floor` that belongs to L.
+   A contact lasts if v is at most `_CALM` times the speed L / (m omega), which a body reaches that
+   is set down under the load L without penetration; for a > 2, at most the `floor` of that load.
 
 2. The kick of a step is the mean force over the step centred at the present position, during which
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
@@ -55,6 +57,10 @@ import math
 
 from physics.compiler.jit import stage
 
+# A contact counts as lasting while its impact speed is at most max(a, this) * (load / m) / omega.
+# A body that is set down without penetration reaches 1; the rest is a margin
+_CALM = 2.0
+
 
 @stage
 def hunt_crossley_force(
@@ -69,6 +75,7 @@ def hunt_crossley_force(
     load_rate,
     inverse_mean_force,
     mean_impact_speed,
+    impact_ratio,
     impact_speed,
     previous_force,
     previous_approach,
@@ -87,7 +94,8 @@ def hunt_crossley_force(
         h: s.
         load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
-        mean_impact_speed: m/s, of the pair's samples that approached in the last step; else 0.
+        mean_impact_speed: m/s, of the pair in the last step; samples that separated count as 0.
+        impact_ratio: of impact speed to rate of the samples that approached in the last step.
         impact_speed: m/s, remembered; negative while separating, 0 while apart.
         previous_force: N, f of the last step.
         previous_approach: m/s, of the last step.
@@ -103,10 +111,14 @@ def hunt_crossley_force(
     S = penetration if deep else reach * reach
     D = 1.0 if deep else 4.0 * b
     begins = impact_speed == 0.0
-    remembered = mean_impact_speed if begins else abs(impact_speed)
+    # a candidate that has just been listed has no rate of the last step
+    joined = previous_approach * impact_ratio if previous_approach != 0.0 else mean_impact_speed
+    # only a sample that comes through the surface joins: not one that was inside and changed face
+    joined = min(joined, mean_impact_speed) if penetration <= h * approach else 0.0
+    remembered = joined if begins else abs(impact_speed)
     turned_around = (impact_speed < 0.0) & (approach > 0.0)
     speed = max(max(0.0 if turned_around else remembered, approach), floor)
-    calm_per_load = max(a, 1.0) * speed_per_load
+    calm_per_load = max(a, _CALM) * speed_per_load
     change = load_rate * (approach - previous_approach)
     by_force = previous_force + change * (previous_force * inverse_mean_force)
     lasts = speed <= max(floor, calm_per_load * by_force)
@@ -143,6 +155,7 @@ def dashpot_force(
     load_rate,
     inverse_mean_force,
     mean_impact_speed,
+    impact_ratio,
     impact_speed,
     previous_force,
     previous_approach,
