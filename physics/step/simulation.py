@@ -108,6 +108,8 @@ class Simulation:
             rows = dynamic[worlds, : self.bodies]  # a copy
             dynamic[worlds, : self.bodies] = self._moving(rows, inverse_mass, inertia)
         self.state.world["time"][worlds] = 0.0
+        if self.features.wrench:
+            self.state.wrench[worlds] = 0.0
         self.forget(worlds)
 
     def forget(self, worlds: Array) -> None:

@@ -85,6 +85,15 @@ def test_contacts_keep_their_memory_and_neighbours_every_bit():
     assert np.any(pushed.position[3] != plain.position[3])
 
 
+def test_a_reset_ends_a_force_that_waits():
+    world = bodies(count=2)
+    world.apply_wrench((1.0, 0, 0), body=0)
+    world.reset(np.array([True, False]))
+    np.testing.assert_array_equal(world.force()[:, 0, 0], [0.0, 1.0])
+    world.advance(0.04)
+    np.testing.assert_allclose(world.linear_velocity[:, 0, 0], [0.0, 0.04 / MASS], rtol=1e-13)
+
+
 def test_a_snapshot_keeps_a_force_that_waits():
     world = bodies()
     empty = world.snapshot()
