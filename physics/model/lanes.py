@@ -165,8 +165,8 @@ def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
 def end_refresh(model, state, workspace, g):
     """Ends a refresh, which computes forces in the whole group: other lanes get theirs back.
 
-    `broadphase.make_forget` had limited `updates_memory` to the lanes that start anew; now it holds
-    for all active lanes again.
+    `broadphase.make_forget` had limited `updates_memory` to the lanes whose contacts begin afresh;
+    now it holds for all active lanes again.
     """
     lane = workspace.lane[0]
     for i in range(LANES):

@@ -15,9 +15,9 @@ inertia, so their force and torque are those of the body to second order in its 
 import math
 
 from physics.compiler.jit import LANES, at, stage
-from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
+from physics.model.features import cached_by_features
 from physics.model.tables import ATTRACTOR, DRAG, POINT_SPRING
-from physics.motion.kinematics import angular_velocity_of
+from physics.motion.kinematics import make_angular_velocity
 from physics.motion.vectors import cross, rotated
 
 
@@ -27,7 +27,7 @@ def make_present_velocities(features):
 
     It comes before `gravity`, which clears the forces of the last step.
     """
-    fields, rotation = features.fields, features.rotation
+    fields, angular_velocity = features.fields, make_angular_velocity(features)
 
     @stage
     def present_velocities(model, workspace, drifted):
@@ -47,22 +47,13 @@ def make_present_velocities(features):
                     v[0, i] = inverse_mass * (P[0, i] + half * F[0, i])
                     v[1, i] = inverse_mass * (P[1, i] + half * F[1, i])
                     v[2, i] = inverse_mass * (P[2, i] + half * F[2, i])
-                    if rotation != NO_ROTATION:
-                        lx, ly, lz = (
-                            L[0, i] + half * T[0, i],
-                            L[1, i] + half * T[1, i],
-                            L[2, i] + half * T[2, i],
-                        )
-                        jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                        if rotation == GENERAL:
-                            ox, oy, oz = angular_velocity_of(
-                                q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz
-                            )
-                        else:
-                            ox, oy, oz = jx * lx, jx * ly, jx * lz
-                        omega[0, i] = ox
-                        omega[1, i] = oy
-                        omega[2, i] = oz
+                    lx = L[0, i] + half * T[0, i]
+                    ly = L[1, i] + half * T[1, i]
+                    lz = L[2, i] + half * T[2, i]
+                    ox, oy, oz = angular_velocity(q, j, i, lx, ly, lz)
+                    omega[0, i] = ox
+                    omega[1, i] = oy
+                    omega[2, i] = oz
 
     return present_velocities
 

@@ -68,9 +68,30 @@ def angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
 
 
 @cached_by_features
+def make_angular_velocity(features):
+    """Formula for omega in lane i of orientations q, 1/moments j and angular momenta l."""
+    rotation = features.rotation
+
+    @stage
+    def angular_velocity(q, j, i, lx, ly, lz):
+        jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
+        if rotation == NO_ROTATION:
+            ox, oy, oz = 0.0, 0.0, 0.0
+        elif rotation == GENERAL:
+            ox, oy, oz = angular_velocity_of(
+                q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz
+            )
+        else:
+            ox, oy, oz = jx * lx, jx * ly, jx * lz
+        return ox, oy, oz
+
+    return angular_velocity
+
+
+@cached_by_features
 def make_kinematics(features):
     """Stage that updates the frames of the dynamic bodies from their state."""
-    rotation = features.rotation
+    angular_velocity = make_angular_velocity(features)
 
     @stage
     def kinematics(model, workspace):
@@ -88,16 +109,7 @@ def make_kinematics(features):
             for i in range(LANES):
                 write_rotation(solid, i)
             for i in range(LANES):
-                lx, ly, lz = L[0, i], L[1, i], L[2, i]
-                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                if rotation == NO_ROTATION:
-                    ox, oy, oz = 0.0, 0.0, 0.0
-                elif rotation == GENERAL:
-                    ox, oy, oz = angular_velocity_of(
-                        q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz
-                    )
-                else:
-                    ox, oy, oz = jx * lx, jx * ly, jx * lz
+                ox, oy, oz = angular_velocity(q, j, i, L[0, i], L[1, i], L[2, i])
                 omega[0, i] = ox
                 omega[1, i] = oy
                 omega[2, i] = oz

@@ -32,7 +32,7 @@ TROUGH = Compound(
     ids=["rods", "plates", "compounds"],
 )
 def test_samples_that_change_face_bring_no_energy(shape, preset, friction):
-    """They begin anew inside of a solid; with the speed of the others they gained up to 1.3 %."""
+    """They begin inside of a solid; with the speed of the others they gained up to 1.3 %."""
     world = grazing((shape, shape), 0.95, friction, preset, 1500)
     assert energy_gain(world) < 5e-5
 
