@@ -7,6 +7,7 @@ from physics.scene.compound import Compound
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.fields import Attractor, Drag, PointSpring
+from physics.scene.joints import BallJoint, Distance, Hinge, Motor, Slider, Weld
 from physics.scene.material import Material
 from physics.scene.parameters import Parameters
 from physics.scene.part import Part
@@ -19,27 +20,33 @@ from physics.world import Snapshot, World
 __all__ = [
     "PRESETS",
     "Attractor",
+    "BallJoint",
     "Body",
     "Box",
     "Capsule",
     "Compound",
     "ContactOverflow",
     "Contacts",
+    "Distance",
     "Drag",
     "Drive",
     "Features",
     "Fidelity",
     "Gripper",
     "Ground",
+    "Hinge",
     "Material",
+    "Motor",
     "Parameters",
     "Part",
     "PointSpring",
     "Readout",
     "Scene",
     "SimulationDiverged",
+    "Slider",
     "Snapshot",
     "Sphere",
     "Static",
+    "Weld",
     "World",
 ]

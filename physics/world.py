@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from physics import snapshot
-from physics.analysis import diagnostics, energies, field_limits, readouts, stability
+from physics.analysis import diagnostics, energies, field_limits, joints, readouts, stability
 from physics.analysis.diagnostics import Contacts
 from physics.analysis.failures import failure
 from physics.analysis.parameter_limits import ParameterLimits
@@ -146,8 +146,9 @@ class World:
 
         Raises:
             ValueError: a wrong shape, a value that isn't finite, a quaternion of length zero,
-                fingers of a gripper that differ in x or z, or an angular velocity in a scene
-                whose rotation isn't simulated. The state is then unchanged.
+                fingers of a gripper that differ in x or z, an angular velocity in a scene whose
+                rotation isn't simulated, or poses that a joint doesn't allow. The state is then
+                unchanged.
         """
         given = {
             "position": position,
@@ -229,6 +230,21 @@ class World:
             )
         new[:, chosen, :3], new[:, chosen, 3:] = push, turn
         simulation.add_wrench(new)
+
+    def command_motors(self, velocity: Any) -> None:
+        """Sets the velocities to which the motors of joints drive; they hold until changed.
+
+        Args:
+            velocity: [count, motors] rad/s of hinges, m/s of sliders, or what broadcasts to it; the
+                motors are those of `Scene.joints`, in their order. Zero brakes.
+
+        Raises:
+            ValueError: a wrong shape, a value that isn't finite, or a scene without motors.
+        """
+        motor = self._simulation.state.motor
+        if motor.shape[1] == 0:
+            raise ValueError("command_motors needs a Hinge or Slider with a Motor in Scene.joints")
+        motor[...] = array("velocity", velocity, motor.shape)
 
     # --- parameters ---------------------------------------------------------------------------
 
@@ -425,6 +441,18 @@ class World:
         checked = array("point", point, (self.count, 3))
         self._refresh()
         return readouts.point_acceleration(self._simulation, index, checked)
+
+    def joint_position(self) -> Array:
+        """[count, joints] rad of hinges, m of sliders, zero in the scene's pose; NaN of others."""
+        return joints.positions(self._simulation)
+
+    def joint_velocity(self) -> Array:
+        """[count, joints] rad/s of hinges, m/s of sliders; NaN of others."""
+        return joints.velocities(self._simulation)
+
+    def joint_error(self) -> Array:
+        """[count, joints] the largest violation of each joint's constraints, m or rad."""
+        return joints.errors(self._simulation)
 
     def kinetic_energy(self) -> Array:
         """[count] J of the bodies, translation and rotation."""

@@ -49,6 +49,7 @@ class Solids:
             raise ValueError(
                 f"first and second must be solids that can touch, got {self._names[one]!r} and "
                 f"{self._names[other]!r}: a solid and itself, two statics, a gripper's fingers, "
-                "and solids whose group and mask exclude each other can't"
+                "bodies that a joint connects, and solids whose group and mask exclude each other "
+                "can't"
             )
         return one, other, half_pairs

@@ -21,6 +21,12 @@ import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.compiler.jit import LANES, at, sequence, stage
+from physics.constraints.joint_velocities import (
+    make_begin_hold,
+    make_clear_hold,
+    make_end_hold,
+    make_hold,
+)
 from physics.impulse.point_impulses import (
     add_opposite,
     apply_impulse,
@@ -184,6 +190,8 @@ def make_impacts(features):
     """Stage that lets contacts collide, in the worlds in which any do."""
     impact_sweep = make_impact_sweep(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
+    begin_hold, hold = make_begin_hold(features), make_hold(features)
+    clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
 
     @stage
     def solve_impacts(model, workspace, after):
@@ -200,6 +208,7 @@ def make_impacts(features):
                     pair, mu = operands_of(model, workspace, k), model.half_pair[k].friction
                     impact_sweep(pair, mu, lane, after)
                     couple_finger_velocities(model, workspace)
+            hold(model, workspace, unconverged, 0.0, lane)
             left = 0
             for i in range(LANES):
                 moves = change[i] > TOLERANCE * lane.fastest_approach[i]
@@ -214,11 +223,14 @@ def make_impacts(features):
             if workspace.half_pair[k].slots > 0:
                 apply_restitution(operands_of(model, workspace, k), workspace.lane[0], rescale)
         couple_finger_velocities(model, workspace)
+        hold(model, workspace, workspace.lane[0].colliding, 0.0, workspace.lane[0])
 
     @stage
-    def collide(model, workspace, refresh):
+    def collide(model, workspace, h, refresh):
         lane = workspace.lane[0]
         work, allowed_work, scale = lane.impact_work, lane.allowed_work, lane.restitution_scale
+        clear_hold(model, workspace)
+        begin_hold(model, workspace, True, 0.0)
         for i in range(LANES):
             work[i] = 0.0
         solve_impacts(model, workspace, False)
@@ -233,6 +245,7 @@ def make_impacts(features):
         restitute(model, workspace, True)
         solve_impacts(model, workspace, True)
         apply_impacts(model, workspace, refresh)
+        end_hold(model, workspace, h if refresh else 0.0)
 
     @stage
     def find_all_impacts(model, workspace, h):
@@ -258,6 +271,6 @@ def make_impacts(features):
                 remove_push_out(operands_of(model, workspace, k), workspace.lane[0].colliding)
         couple_finger_velocities(model, workspace)
         if find_all_impacts(model, workspace, h) > 0:
-            collide(model, workspace, refresh)
+            collide(model, workspace, h, refresh)
 
     return impacts

@@ -16,6 +16,12 @@ and the normal n out of the surface, a substep
 """
 
 from physics.compiler.jit import LANES, at, sequence, stage
+from physics.constraints.joint_velocities import (
+    make_begin_hold,
+    make_clear_hold,
+    make_end_hold,
+    make_hold,
+)
 from physics.impulse.contact_rows import make_contact_rows
 from physics.impulse.point_impulses import (
     add_opposite,
@@ -168,6 +174,8 @@ def make_impulses(features):
     sweep, warm_start = make_sweep(features), make_warm_start(features)
     store_forces = make_store_forces(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
+    begin_hold, hold = make_begin_hold(features), make_hold(features)
+    clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
 
     @stage
     def sweep_all(model, workspace, h, soft):
@@ -175,6 +183,18 @@ def make_impulses(features):
             if workspace.half_pair[k].slots > 0:
                 sweep(operands_of(model, workspace, k), model.half_pair[k], h, soft)
                 couple_finger_velocities(model, workspace)
+        lane = workspace.lane[0]
+        hold(model, workspace, lane.in_contact, h if soft else 0.0, lane)
+
+    @stage
+    def find_lanes_in_contact(model, workspace):
+        in_contact = workspace.lane[0].in_contact
+        for i in range(LANES):
+            in_contact[i] = 0
+        for k in range(model.half_pair.shape[0]):
+            count = workspace.half_pair[k].count
+            for i in range(LANES):
+                in_contact[i] = 1 if count[i] > 0 else in_contact[i]
 
     @stage
     def finish(model, state, workspace, g, k, h, elapsed):
@@ -194,6 +214,7 @@ def make_impulses(features):
             candidates += workspace.half_pair[k].slots
         if candidates == 0:
             return
+        find_lanes_in_contact(model, workspace)
         rotate_inertia(model, workspace)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
@@ -202,13 +223,17 @@ def make_impulses(features):
         apply_known_forces(model, workspace, 0.5 * drifted)
         impacts(model, workspace, h, drifted == 0.0)
         apply_known_forces(model, workspace, -0.5 * drifted)
+        clear_hold(model, workspace)
+        begin_hold(model, workspace, False, 0.0)
         sweep_all(model, workspace, h, False)
         apply_known_forces(model, workspace, h)
+        begin_hold(model, workspace, True, h)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
                 warm_start(operands_of(model, workspace, k))
         couple_finger_velocities(model, workspace)
         sweep_all(model, workspace, h, True)
+        end_hold(model, workspace, h)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
                 finish(model, state, workspace, g, k, h, elapsed)

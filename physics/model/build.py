@@ -13,6 +13,7 @@ from physics.model.coefficients import (
 )
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.model.fields import field_rows
+from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.tables import (
     COMPOUND_PART,
@@ -72,7 +73,9 @@ def build(
         for s in scene.statics
     ]
     static = np.array(poses, dtype=float).reshape(-1, 7)
-    model = Model(dynamic, half_pairs, parts, hidden, static, samples, field_rows(scene))
+    world = len(dynamic) + len(static) + len(parts)  # row of Workspace.solid
+    joints = joint_rows(scene, world)
+    model = Model(dynamic, half_pairs, parts, hidden, static, samples, field_rows(scene), joints)
     return model, _features(scene, fidelity, model, per_world_parameters)
 
 
@@ -194,6 +197,7 @@ def _features(
     friction = any(rough[row["owner"]] and rough[row["surface"]] for row in model.half_pair)
     # nothing rotates a ball without friction; if it has no spin either, it needs no orientation
     inert = all(isinstance(b.shape, Sphere) and not any(b.angular_velocity) for b in scene.bodies)
+    inert = inert and not scene.joints
     inert = inert and not any(
         any(f.point) or any(f.to_point) for f in scene.fields if isinstance(f, PointSpring)
     )
@@ -234,6 +238,7 @@ def _features(
         gripper=bool(scene.grippers),
         fields=bool(scene.fields),
         wrench=False,
+        joints=bool(scene.joints),
         compound=len(model.compound_part) > 0,
         per_world_parameters=per_world_parameters,
     )

@@ -30,6 +30,7 @@ class Features(NamedTuple):
         gripper: at least two of the drives are the fingers of a gripper.
         fields: the scene has fields: springs to points, attractors, drag.
         wrench: `World.apply_wrench` has been used.
+        joints: the scene has joints.
         compound: at least one surface is a part of a compound and has its own frame.
         per_world_parameters: masses, materials and sizes can differ between worlds.
     """
@@ -51,6 +52,7 @@ class Features(NamedTuple):
     gripper: bool
     fields: bool
     wrench: bool
+    joints: bool
     compound: bool
     per_world_parameters: bool
 

@@ -29,6 +29,7 @@ def make_constants(features: Features):
                 model.static,
                 model.sample,
                 model.field,
+                model.joint_row,
             )
         return model
 

@@ -174,11 +174,12 @@ def _half_pairs(
     first_drive = len(scene.bodies)
     # the grip servo keeps the two fingers of a gripper apart
     fingers = {(first_drive + first, first_drive + first + 1) for first, _ in scene.grippers}
+    jointed = scene.jointed_pairs
     for i, a in enumerate(solids[:dynamic_count]):
         assert not isinstance(a, Static | Ground)
         for j in range(i + 1, len(solids)):
             b = solids[j]
-            if (i, j) in fingers or not touch_each_other(a, b):
+            if (i, j) in fingers | jointed or not touch_each_other(a, b):
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)

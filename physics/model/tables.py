@@ -161,6 +161,33 @@ FIELD = np.dtype(
     align=True,
 )
 
+# one row per scalar constraint of a joint, see constraints/rows.py; `a` and `b` are rows of
+# Workspace.solid, `b` may be that of the world
+ALONG, PERPENDICULAR, DISTANCE, ANGLE = range(4)  # kinds
+EQUALITY, LOW_LIMIT, HIGH_LIMIT, MOTOR = range(4)  # roles
+JOINT_ROW = np.dtype(
+    [
+        ("joint", "i8"),  # index in the scene
+        ("kind", "i8"),
+        ("role", "i8"),
+        ("a", "i8"),
+        ("b", "i8"),
+        ("point_a", "f8", (3,)),  # m, anchor in the frame of a
+        ("point_b", "f8", (3,)),  # m, anchor in the frame of b
+        ("axis_a", "f8", (3,)),  # in the frame of a
+        ("axis_b", "f8", (3,)),  # in the frame of b
+        ("pivot", "f8", (3,)),  # ANGLE: the axis of rotation in the frame of b
+        ("target", "f8"),  # m or rad: length, or limit
+        ("scale", "f8"),  # m or 1, size of what the value is computed from
+        ("force_limit", "f8"),  # N or N m, of a motor
+        ("motor", "i8"),  # index in State.motor, or -1
+        ("limits", "f8", (2,)),  # rad or m, of a motor's joint
+        ("first", "i8"),  # first row that it is coupled to, and from there on
+        ("entry", "i8"),  # of that row, in Workspace.joint_factor
+    ],
+    align=True,
+)
+
 
 class Model(NamedTuple):
     """The constants of a scene.
@@ -173,6 +200,7 @@ class Model(NamedTuple):
         static: [s, 7] position in m and quaternion x y z w of the statics.
         sample: [4, p] x y z in m in the owner's frame at size 1, and weight.
         field: [f] of FIELD.
+        joint_row: [r] of JOINT_ROW.
     """
 
     dynamic: Array
@@ -182,6 +210,7 @@ class Model(NamedTuple):
     static: Array
     sample: Array
     field: Array
+    joint_row: Array
 
     @property
     def nbytes(self) -> int:

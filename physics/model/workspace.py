@@ -124,6 +124,9 @@ LANE = np.dtype(
         ("needs_refresh", "i8", (LANES,)),
         ("updates_memory", "i8", (LANES,)),  # 0: inactive, or a refresh of other lanes passes by
         ("start", "f8", (LANES,)),  # s, time at which this call began
+        ("joint_unconverged", "i8", (LANES,)),  # 1: joints need another pass
+        ("joint_beyond", "i8", (LANES,)),  # 1: a motor or limit is beyond its bound
+        ("in_contact", "i8", (LANES,)),  # 1: has candidates; impulse law
         # of instantaneous collisions, see impulse/restitution.py
         ("colliding", "i8", (LANES,)),
         ("unconverged", "i8", (LANES,)),  # 1: needs another sweep
@@ -138,6 +141,36 @@ LANE = np.dtype(
 )
 
 
+# one row per scalar constraint of a joint, see constraints/rows.py
+JOINT_WORK = np.dtype(
+    [
+        ("value", "f8", (LANES,)),  # m or rad, relative to the target
+        ("direction", "f8", (3, LANES)),  # of the force on a
+        ("moment_a", "f8", (3, LANES)),  # m or 1, of a unit force along the row on a
+        ("moment_b", "f8", (3, LANES)),  # likewise, with the opposite sign, on b
+        ("turn_a", "f8", (3, LANES)),  # these times the inverse inertia
+        ("turn_b", "f8", (3, LANES)),
+        ("inverse_pivot", "f8", (LANES,)),  # of the factor; 0: left out
+        ("active", "i8", (LANES,)),
+        ("clamped", "i8", (LANES,)),  # 1: has just been set to its bound
+        ("change", "f8", (LANES,)),  # right side, then solution: N, N s or what has their units
+        ("force", "f8", (LANES,)),  # sum of the changes
+        ("rate", "f8", (LANES,)),  # m/s or rad/s that is wanted
+        ("convective", "f8", (LANES,)),  # m/s^2 or rad/s^2, see constraints/convective.py
+        # while impulses of contacts change velocities, see constraints/joint_velocities.py
+        ("known_force", "f8", (LANES,)),  # N or N m, without that of contacts
+        ("allowed", "i8", (LANES,)),  # 1: may act
+        ("aim", "f8", (LANES,)),  # m/s or rad/s
+        ("lacking", "f8", (LANES,)),  # m/s or rad/s
+        ("impulse", "f8", (LANES,)),  # N s or N m s, sum
+    ],
+    align=True,
+)
+
+# one row per dynamic body: the pose at the start of a drift
+POSE = np.dtype([("position", "f8", (3, LANES)), ("orientation", "f8", (4, LANES))], align=True)
+
+
 @cached_by_features
 def remembered_dtype(features: Features) -> np.dtype:
     """One row per candidate of a list that is being replaced."""
@@ -149,7 +182,7 @@ class Workspace(NamedTuple):
     """Working arrays of one call of a kernel; threads never share one.
 
     Attributes:
-        solid: [solids and compound parts] of SOLID.
+        solid: [solids and compound parts] of SOLID; with joints one more, the world.
         relative: [2] of SOLID: the owner of a half-pair in the frame of the surface; and, while a
             pair is searched, the same of the reverse half-pair.
         half_pair: [half-pairs] of HALF_PAIR_WORK.
@@ -159,6 +192,9 @@ class Workspace(NamedTuple):
         tensor: [solids] of TENSOR, inverse inertia in the world frame; impulse law.
         contact_row: [slots] of CONTACT_ROW; impulse law.
         manifold: [two longest lists] of MANIFOLD_POINT; impulse law.
+        joint: [rows of joints] of JOINT_WORK.
+        joint_factor: [entries, LANES] off the diagonal, see constraints/envelope.py.
+        start_pose: [dynamic bodies] of POSE; with joints.
     """
 
     solid: Array
@@ -170,6 +206,9 @@ class Workspace(NamedTuple):
     tensor: Array
     contact_row: Array
     manifold: Array
+    joint: Array
+    joint_factor: Array
+    start_pose: Array
 
     @classmethod
     def of(cls, model: Model, features: Features) -> "Workspace":
@@ -178,8 +217,10 @@ class Workspace(NamedTuple):
         longest = int(half_pair["slot_count"].max(initial=0))
         solids = len(model.dynamic) + len(model.static)
         slots = int(half_pair["slot_count"].sum())
+        joints, rows = int(features.joints), model.joint_row
+        entries = int((np.arange(len(rows)) - rows["first"]).sum())
         return cls(
-            solid=aligned_zeros(solids + len(model.compound_part), SOLID),
+            solid=aligned_zeros(solids + len(model.compound_part) + joints, SOLID),
             relative=aligned_zeros(2, SOLID),
             half_pair=aligned_zeros(len(half_pair), HALF_PAIR_WORK),
             lane=aligned_zeros(1, LANE),
@@ -188,4 +229,7 @@ class Workspace(NamedTuple):
             tensor=aligned_zeros(solids if impulse else 0, TENSOR),
             contact_row=aligned_zeros(slots if impulse else 0, CONTACT_ROW),
             manifold=np.zeros(2 * longest if impulse else 0, MANIFOLD_POINT),
+            joint=aligned_zeros(len(rows), JOINT_WORK),
+            joint_factor=aligned_zeros((entries, LANES), np.dtype(float)),
+            start_pose=aligned_zeros(joints * len(model.dynamic), POSE),
         )

@@ -10,7 +10,7 @@ from physics.scene.validation import ZERO, Vector, number, vector
 BodyName = int | str
 
 
-def _check_body(field: str, body: object) -> None:
+def check_body(field: str, body: object) -> None:
     """Raises TypeError unless a body is given by index or name; `Scene` checks that it exists."""
     if isinstance(body, bool) or not isinstance(body, int | str):
         raise TypeError(f"{field} must be the index or the name of a body, got {body!r}")
@@ -48,14 +48,14 @@ class PointSpring:
 
     def __post_init__(self) -> None:
         """Checks every field."""
-        _check_body("PointSpring.body", self.body)
+        check_body("PointSpring.body", self.body)
         for name in ("stiffness", "damping", "rest_length"):
             value = number(f"PointSpring.{name}", getattr(self, name), low=0.0)
             object.__setattr__(self, name, value)
         for name in ("point", "to_point"):
             object.__setattr__(self, name, vector(f"PointSpring.{name}", getattr(self, name)))
         if isinstance(self.to, int | str):
-            _check_body("PointSpring.to", self.to)
+            check_body("PointSpring.to", self.to)
             return
         object.__setattr__(self, "to", vector("PointSpring.to", self.to))
         if any(self.to_point):
@@ -121,7 +121,7 @@ class Drag:
             value = number(f"Drag.{name}", getattr(self, name), low=0.0)
             object.__setattr__(self, name, value)
         if self.body is not None:
-            _check_body("Drag.body", self.body)
+            check_body("Drag.body", self.body)
 
 
 Field = PointSpring | Attractor | Drag

@@ -4,6 +4,7 @@ A scene and all that is in it are frozen and checked when they are built. An err
 its value and what would be right.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,16 +15,17 @@ from physics.scene import saving
 from physics.scene.compound import Compound
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
+from physics.scene.joints import BallJoint, Distance, Hinge, Joint, Motor, Slider, Weld
 from physics.scene.material import Material
 from physics.scene.part import Part
 from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
-from physics.scene.validation import Vector, instance, vector
+from physics.scene.validation import ZERO, Vector, instance, vector
 
 # classes of all objects that a scene is made of
 _PARTS = (
     Body, Ground, Static, Drive, Gripper, Material, PointSpring, Attractor, Drag,
-    Sphere, Box, Capsule, Compound, Part,
+    Sphere, Box, Capsule, Compound, Part, BallJoint, Hinge, Slider, Weld, Distance, Motor,
 )  # fmt: skip
 
 
@@ -37,10 +39,11 @@ class Scene:
         drives: driven solids: Drive or Gripper.
         gravity: m/s^2.
         fields: other forces on bodies: PointSpring, Attractor or Drag.
+        joints: BallJoint, Hinge, Slider, Weld or Distance.
 
     Raises:
         TypeError, ValueError: an argument is of the wrong type; two solids have the same name; a
-            force on a body that isn't there.
+            force or joint on a body that isn't there; a distance that its anchors don't have.
     """
 
     bodies: Sequence[Body] = ()
@@ -48,6 +51,7 @@ class Scene:
     drives: Sequence[Drive | Gripper] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
     fields: Sequence[Field] = ()
+    joints: Sequence[Joint] = ()
 
     def __post_init__(self) -> None:
         """Checks every field and turns the sequences into tuples."""
@@ -56,6 +60,7 @@ class Scene:
             "statics": (Ground, Static),
             "drives": (Drive, Gripper),
             "fields": (PointSpring, Attractor, Drag),
+            "joints": (BallJoint, Hinge, Slider, Weld, Distance),
         }
         for name, types in kinds.items():
             value = getattr(self, name)
@@ -72,6 +77,8 @@ class Scene:
             raise ValueError(f"Scene: names of solids must be unique, got {twice[0]!r} twice")
         for i, force in enumerate(self.fields):
             self._check_field(f"Scene.fields[{i}]", force)
+        for i, joint in enumerate(self.joints):
+            self._check_joint(f"Scene.joints[{i}]", joint)
 
     def _check_field(self, where: str, force: Field) -> None:
         """Raises ValueError if a field acts on a body that isn't there, or ties one to itself."""
@@ -85,6 +92,39 @@ class Scene:
             and self.body_index(force.to) == self.body_index(force.body)
         ):
             raise ValueError(f"{where}: PointSpring.to is the body itself, {to!r}")
+
+    def _check_joint(self, where: str, joint: Joint) -> None:
+        """Raises ValueError if a joint has no two different bodies, or anchors that disagree."""
+        kind = type(joint).__name__
+        a = self.body_index(joint.a, f"{where}: {kind}.a")
+        b = None if joint.b is None else self.body_index(joint.b, f"{where}: {kind}.b")
+        if a == b:
+            raise ValueError(f"{where}: {kind}.b is the same body as a, {joint.b!r}")
+        if isinstance(joint, Distance):
+            apart = math.dist(*self.distance_anchors(joint))
+            if apart == 0.0:
+                raise ValueError(f"{where}: Distance between two anchors at the same point")
+            if joint.length is not None and abs(joint.length - apart) > 1e-9 * apart:
+                raise ValueError(
+                    f"{where}: Distance.length {joint.length:g} m disagrees with its anchors, "
+                    f"{apart:.9g} m apart in the scene; give length=None or move a body"
+                )
+
+    def distance_anchors(self, joint: Distance) -> tuple[Vector, Vector]:
+        """Both ends of a Distance, world frame, m."""
+        a = self.bodies[self.body_index(joint.a)].position
+        b = ZERO if joint.b is None else self.bodies[self.body_index(joint.b)].position
+        return joint.anchor or a, joint.to_anchor or b
+
+    @cached_property
+    def jointed_pairs(self) -> frozenset[tuple[int, int]]:
+        """Pairs of bodies that don't touch each other because a joint connects them."""
+        pairs = set()
+        for joint in self.joints:
+            if joint.b is not None and not joint.collide:
+                first, second = sorted((self.body_index(joint.a), self.body_index(joint.b)))
+                pairs.add((first, second))
+        return frozenset(pairs)
 
     def body_index(self, body: BodyName, field: str = "body") -> int:
         """Index of a body that is given by index or name.

@@ -77,8 +77,8 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
     except (TypeError, ValueError):
         raise TypeError(f"{field} must be {size} numbers, got {value!r}") from None
     if array.shape != (size,):
-        names = "(x, y, z)" if size == 3 else "(x, y, z, w)"
-        raise ValueError(f"{field} must be {size} numbers {names}, got {value!r}")
+        names = {3: " (x, y, z)", 4: " (x, y, z, w)"}.get(size, "")
+        raise ValueError(f"{field} must be {size} numbers{names}, got {value!r}")
     if not np.all(np.isfinite(array)):
         raise ValueError(f"{field} must be finite, got {value!r}")
     return tuple(float(x) for x in array)

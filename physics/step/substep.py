@@ -3,13 +3,15 @@
 from physics.collision.broadphase import make_broadphase
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.jit import sequence
+from physics.constraints.joint_drift import make_joint_drift
+from physics.constraints.joint_forces import make_joint_forces
 from physics.impulse.solver import make_impulses
 from physics.model.features import Features, cached_by_features
 from physics.model.lanes import end_refresh
 from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.fields import make_fields, make_present_velocities, make_wrenches
 from physics.motion.gravity import gravity
-from physics.motion.integrator import make_drift, make_kick
+from physics.motion.integrator import make_kick
 from physics.motion.kinematics import make_kinematics
 from physics.spring.contacts import make_contacts
 
@@ -19,21 +21,26 @@ def make_forces(features: Features):
     """Sequence that computes the forces at the present positions.
 
     Velocities are those of the last drift, which took `drifted` s, so they lag positions by half of
-    it.
+    it. A substep takes `h` s; impulses act for `span` s.
     """
     present_velocities, fields = make_present_velocities(features), make_fields(features)
     wrenches, drives = make_wrenches(features), make_drives(features)
     couple_fingers = make_finger_coupling(features)
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
+    joint_forces, impulse = make_joint_forces(features), features.impulse
 
     @sequence
-    def forces(model, state, workspace, g, h, drifted, elapsed):
+    def forces(model, state, workspace, g, h, span, drifted, elapsed):
         present_velocities(model, workspace, drifted)
         gravity(model, workspace)
         fields(model, workspace)
         wrenches(state, workspace, g)
         drives(model, workspace, drifted)
-        contacts(model, state, workspace, g, h, drifted, elapsed)
+        if impulse:  # its sweeps correct the joints' forces
+            joint_forces(model, state, workspace, g, h, drifted)
+        contacts(model, state, workspace, g, span, drifted, elapsed)
+        if not impulse:
+            joint_forces(model, state, workspace, g, h, drifted)
         couple_fingers(model, workspace, drifted)
 
     return forces
@@ -43,7 +50,7 @@ def make_forces(features: Features):
 def make_substep(features: Features):
     """Sequence of one substep for the worlds of lane group g."""
     kick = make_kick(features)
-    drift = make_drift(features)
+    drift = make_joint_drift(features)
     kinematics = make_kinematics(features)
     compound_frames = make_compound_frames(features)
     broadphase = make_broadphase(features)
@@ -63,7 +70,7 @@ def make_substep(features: Features):
         broadphase(model, state, workspace, g, starts_collision_step)
         # a single call: two calls would be compiled twice
         span, drifted = (refresh_span * h, 0.0) if refresh else (h, h)
-        forces(model, state, workspace, g, span, drifted, elapsed)
+        forces(model, state, workspace, g, h, span, drifted, elapsed)
         if refresh:
             end_refresh(model, state, workspace, g)
         else:

@@ -6,10 +6,14 @@ from typing import Any
 import numpy as np
 
 from physics.model.features import NO_ROTATION
+from physics.model.joint_values import pose_errors
 from physics.scene.validation import array
 from physics.step.simulation import Simulation, angular_momentum_of
 
 Array = np.ndarray
+
+# m or rad, by which poses from the user may violate a joint; the next step removes it
+JOINT_TOLERANCE = 1e-6
 
 
 def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array) -> None:
@@ -24,6 +28,7 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
         ValueError: see `World.set_state`; the state is then unchanged.
     """
     new = _checked(simulation, given, int(worlds.sum()))
+    _check_joints(simulation, new, worlds)
     state, bodies, chosen = simulation.state, simulation.bodies, np.flatnonzero(worlds)
     # if only the orientation changes, the angular velocity stays and the angular momentum changes
     angular_velocity = new.get("angular_velocity")
@@ -101,6 +106,25 @@ def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> d
                     f"{first} and {first + 1}, which are one solid along these axes"
                 )
     return new
+
+
+def _check_joints(simulation: Simulation, new: Mapping[str, Array], worlds: Array) -> None:
+    """Raises ValueError if new poses violate a joint: the next step would throw the bodies."""
+    joints = simulation.scene.joints
+    if not joints or not ("position" in new or "orientation" in new) or not worlds.any():
+        return
+    before = simulation.state.dynamic[worlds, : simulation.bodies]
+    poses = (new.get(name, before[name]) for name in ("position", "orientation"))
+    errors = pose_errors(simulation.base.joint_row, len(joints), *poses)
+    n, j = divmod(int(np.argmax(errors)), len(joints))
+    if errors[n, j] > JOINT_TOLERANCE:
+        name = joints[j].name or f"joint {j}"
+        raise ValueError(
+            f"position and orientation must agree with the joints within {JOINT_TOLERANCE:g} m or "
+            f"rad: in world {np.flatnonzero(worlds)[n]} they violate {name}, a "
+            f"{type(joints[j]).__name__} between {joints[j].a!r} and {joints[j].b!r}, by "
+            f"{errors[n, j]:.3g}; set the poses of both bodies"
+        )
 
 
 def _unit(quaternion: Array) -> Array:

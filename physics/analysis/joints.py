@@ -1,0 +1,38 @@
+"""What can be asked of joints: angle or displacement, its rate, and how well the joint holds."""
+
+import numpy as np
+
+from physics.model.joint_values import frame_of, measure, pose_errors
+from physics.model.joints import free_directions
+from physics.step.simulation import Simulation
+
+Array = np.ndarray
+
+
+def positions(simulation: Simulation) -> Array:
+    """[count, joints] rad of hinges, m of sliders; NaN of others."""
+    return _of_free_directions(simulation)[0]
+
+
+def velocities(simulation: Simulation) -> Array:
+    """[count, joints] rad/s of hinges, m/s of sliders; NaN of others."""
+    return _of_free_directions(simulation)[1]
+
+
+def errors(simulation: Simulation) -> Array:
+    """[count, joints] the largest violation of each joint's constraints, m or rad."""
+    bodies = simulation.state.dynamic[:, : simulation.bodies]
+    joints = len(simulation.scene.joints)
+    return pose_errors(simulation.base.joint_row, joints, bodies["position"], bodies["orientation"])
+
+
+def _of_free_directions(simulation: Simulation) -> Array:
+    """[2, count, joints] value and rate of the direction that each joint leaves free."""
+    scene, bodies = simulation.scene, simulation.state.dynamic[:, : simulation.bodies]
+    velocity = bodies["momentum"] * simulation.of_bodies("inverse_mass")[..., None]
+    columns = (bodies["position"], bodies["orientation"], velocity, simulation.angular_velocity())
+    found = np.full((2, simulation.count, len(scene.joints)), np.nan)
+    for row in free_directions(scene):
+        ends = [frame_of(int(row[end]), *columns) for end in ("a", "b")]
+        found[:, :, row["joint"]] = measure(row, *ends)
+    return found

@@ -1,0 +1,1 @@
+"""Joints: scalar constraints between bodies, solved together."""

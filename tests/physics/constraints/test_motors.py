@@ -1,0 +1,104 @@
+"""Limits stop and only push; motors reach their velocity with a limited force."""
+
+import math
+
+import numpy as np
+import pytest
+
+from physics import Fidelity, Hinge, Motor, Scene, Slider, World
+from tests.physics.constraints.jointed import (
+    MASS,
+    energy,
+    ghost,
+    pendulum,
+    pendulum_inertia,
+)
+
+G = 9.81
+
+
+def test_a_limit_stops_a_pendulum_and_holds_it():
+    """It stops without a rebound, never passes the limit, and never gains energy."""
+    world = pendulum(1.2, "balanced", limits=(-0.9, 0.5))
+    before = float(energy(world)[0])
+    for _ in range(300):
+        world.advance(0.01)
+        assert -0.9 - 1e-9 <= world.joint_position()[0, 0] <= 0.5
+        assert float(energy(world)[0]) < before + 1e-6
+        before = float(energy(world)[0])
+    assert world.joint_position()[0, 0] == pytest.approx(-0.9, abs=1e-12)
+    assert world.joint_velocity()[0, 0] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(world.force()[0, 0], 0.0, atol=1e-7)
+
+
+def test_a_limit_lets_go():
+    world = pendulum(1.2, "balanced", limits=(-0.9, 0.5), motor=Motor(20.0, -1.0))
+    world.advance(2.0)
+    assert world.joint_position()[0, 0] == pytest.approx(-0.9, abs=1e-9)
+    world.command_motors(1.0)
+    world.advance(0.5)
+    assert world.joint_position()[0, 0] == pytest.approx(-0.4, abs=6e-3)  # it has to start
+
+
+def test_a_motor_accelerates_with_its_limit_and_then_keeps_its_velocity():
+    joint = Hinge(0, None, (0, 0, 0), (0, 0, 1), motor=Motor(0.02, 2.0))
+    body = ghost()
+    world = World(Scene([body], gravity=(0, 0, 0), joints=[joint]), Fidelity(substep=1e-3))
+    inertia = float(body.shape.inertia(MASS)[2])
+    world.advance(0.01)
+    assert world.joint_velocity()[0, 0] == pytest.approx(0.02 / inertia * 0.01, rel=0.06)
+    world.advance(2.0)
+    assert world.joint_velocity()[0, 0] == pytest.approx(2.0, rel=1e-9)
+    world.command_motors([[-1.0]])
+    world.advance(2.0)
+    assert world.joint_velocity()[0, 0] == pytest.approx(-1.0, rel=1e-9)
+
+
+def test_a_motor_holds_what_its_torque_can_hold():
+    """A horizontal pendulum: it needs m g l; with less it falls with what is left."""
+    needed = MASS * G * 0.25
+    strong = pendulum(0.5 * math.pi, "balanced", motor=Motor(1.01 * needed))
+    strong.advance(1.0)
+    assert abs(strong.joint_position()[0, 0]) < 1e-6
+    weak = pendulum(0.5 * math.pi, Fidelity(substep=5e-4), motor=Motor(0.4 * needed))
+    weak.advance(0.05)
+    falls = -0.5 * 0.6 * needed / pendulum_inertia() * 0.05**2
+    assert weak.joint_position()[0, 0] == pytest.approx(falls, rel=0.02)
+
+
+def test_a_slider_with_motor_lifts_to_its_limit():
+    joint = Slider(0, None, (0, 0, 1), limits=(-0.1, 0.2), motor=Motor(1.5 * MASS * G, 0.5))
+    world = World(Scene([ghost()], joints=[joint]), "balanced")
+    world.advance(0.3)
+    # the first 0.1 s accelerate with half of g
+    assert world.joint_velocity()[0, 0] == pytest.approx(0.5, rel=1e-6)
+    assert world.joint_position()[0, 0] == pytest.approx(
+        0.5 * 0.3 - 0.5 * 0.5**2 / (0.5 * G), abs=2e-3
+    )
+    world.advance(1.0)
+    assert world.joint_position()[0, 0] == pytest.approx(0.2, abs=1e-9)
+
+
+def test_worlds_have_motors_of_their_own_and_neighbours_change_no_bit():
+    motor = Motor(3.0)
+    many = pendulum(1.2, "balanced", count=19, limits=(-1.0, 0.8), motor=motor)
+    speeds = np.linspace(-2.0, 2.0, 19)[:, None]
+    many.command_motors(speeds)
+    alone = pendulum(1.2, "balanced", limits=(-1.0, 0.8), motor=motor)
+    alone.command_motors(speeds[17])
+    for _ in range(20):
+        many.advance(0.04)
+        alone.advance(0.04)
+    np.testing.assert_array_equal(many.position[17], alone.position[0])
+    np.testing.assert_array_equal(many.angular_velocity[17], alone.angular_velocity[0])
+    assert np.ptp(many.joint_position()) > 0.5
+    saved = many.snapshot()
+    many.advance(0.2)
+    after = many.position.copy()
+    many.command_motors(0.0)
+    many.restore(saved)
+    many.advance(0.2)
+    np.testing.assert_array_equal(many.position, after)
+    many.reset()
+    many.advance(1.0)
+    np.testing.assert_array_equal(many.position[0], many.position[18])
