@@ -23,7 +23,7 @@ from physics.snapshot import Snapshot
 from physics.step.readout import Readout
 from physics.step.simulation import Simulation, read_only
 from physics.step.threads import check_threads
-from physics.step.write_state import write_state
+from physics.step.write_state import write_motors, write_state
 
 Array = np.ndarray
 
@@ -241,10 +241,19 @@ class World:
         Raises:
             ValueError: a wrong shape, a value that isn't finite, or a scene without motors.
         """
-        motor = self._simulation.state.motor
-        if motor.shape[1] == 0:
-            raise ValueError("command_motors needs a Hinge or Slider with a Motor in Scene.joints")
-        motor[...] = array("velocity", velocity, motor.shape)
+        write_motors(self._simulation, "velocity", velocity)
+
+    def move_motors(self, position: Any) -> None:
+        """Makes servos of the motors of joints, with these set points; they hold until changed.
+
+        Args:
+            position: [count, motors] rad of hinges, m of sliders, or what broadcasts to it; a hinge
+                turns the shorter way.
+
+        Raises:
+            ValueError: a wrong shape, a value that isn't finite, or a scene without motors.
+        """
+        write_motors(self._simulation, "position", position)
 
     # --- parameters ---------------------------------------------------------------------------
 

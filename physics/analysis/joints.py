@@ -21,16 +21,21 @@ def velocities(simulation: Simulation) -> Array:
 
 def errors(simulation: Simulation) -> Array:
     """[count, joints] the largest violation of each joint's constraints, m or rad."""
-    bodies = simulation.state.dynamic[:, : simulation.bodies]
+    dynamic, rows = simulation.state.dynamic, simulation.base.joint_row
     joints = len(simulation.scene.joints)
-    return pose_errors(simulation.base.joint_row, joints, bodies["position"], bodies["orientation"])
+    return pose_errors(rows, joints, dynamic["position"], dynamic["orientation"])
 
 
 def _of_free_directions(simulation: Simulation) -> Array:
     """[2, count, joints] value and rate of the direction that each joint leaves free."""
-    scene, bodies = simulation.scene, simulation.state.dynamic[:, : simulation.bodies]
-    velocity = bodies["momentum"] * simulation.of_bodies("inverse_mass")[..., None]
-    columns = (bodies["position"], bodies["orientation"], velocity, simulation.angular_velocity())
+    scene, dynamic, bodies = simulation.scene, simulation.state.dynamic, simulation.bodies
+    velocity, omega = np.zeros((2, *dynamic["position"].shape))
+    inverse_mass = simulation.of_bodies("inverse_mass")[..., None]
+    velocity[:, :bodies] = dynamic["momentum"][:, :bodies] * inverse_mass
+    inverse_mass = simulation.base.dynamic["inverse_mass"][bodies:, None]
+    velocity[:, bodies:] = dynamic["momentum"][:, bodies:] * inverse_mass
+    omega[:, :bodies] = simulation.angular_velocity()
+    columns = (dynamic["position"], dynamic["orientation"], velocity, omega)
     found = np.full((2, simulation.count, len(scene.joints)), np.nan)
     for row in free_directions(scene):
         ends = [frame_of(int(row[end]), *columns) for end in ("a", "b")]

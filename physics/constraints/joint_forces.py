@@ -19,13 +19,15 @@ there was no drift: then x makes J dv/dt + dJ/dt v = 0, and a motor's velocity c
 kick that follows.
 """
 
+import math
+
 from physics.compiler.jit import LANES, stage
 from physics.constraints.convective import make_convective_rates
 from physics.constraints.envelope import factor, solve
 from physics.constraints.joint_drift import write_world_frame
 from physics.constraints.rows import add_along_row, add_rates_of_momenta, linearise_rows
 from physics.model.features import cached_by_features
-from physics.model.tables import EQUALITY, MOTOR
+from physics.model.tables import ANGLE, EQUALITY, MOTOR
 
 # relative to the lengths that a value is computed from: a limit that is nearer is touched
 TOUCHED = 1e-9
@@ -45,7 +47,13 @@ def _start(model, state, workspace, g):
             work.active[i] = 1
             if row.role == MOTOR:
                 w = g * LANES + i
-                rate = state.motor[w, row.motor] if w < state.motor.shape[0] else 0.0
+                rate = 0.0
+                if w < state.motor.shape[0]:
+                    rate = state.motor[w, row.motor, 0]
+                    left = state.motor[w, row.motor, 1] - work.value[i]
+                    if row.kind == ANGLE:  # the shorter way
+                        left -= 2.0 * math.pi * math.floor(left / (2.0 * math.pi) + 0.5)
+                    rate = row.frequency * left if left == left else rate  # NaN: no servo
                 rate = max(rate, 0.0) if work.value[i] <= row.limits[0] + margin else rate
                 rate = min(rate, 0.0) if work.value[i] >= row.limits[1] - margin else rate
                 work.rate[i] = rate

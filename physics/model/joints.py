@@ -21,9 +21,10 @@ from physics.model.tables import (
     PERPENDICULAR,
 )
 from physics.rotation import rotation_matrix
-from physics.scene.fields import BodyName
+from physics.scene.drives import Drive
 from physics.scene.joints import BallJoint, Distance, Hinge, Joint, Slider, Weld
 from physics.scene.scene import Scene
+from physics.scene.solids import Body
 
 Array = np.ndarray
 
@@ -45,7 +46,8 @@ def joint_rows(scene: Scene, world: int) -> Array:
 
 def free_directions(scene: Scene) -> list[Any]:
     """A record of JOINT_ROW for each hinge and slider: the direction that it leaves free."""
-    found = [_Rows(scene, j, len(scene.bodies)).free for j in range(len(scene.joints))]
+    solids = len(scene.bodies) + len(scene.driven_bodies)
+    found = [_Rows(scene, j, solids).free for j in range(len(scene.joints))]
     return [row for row in found if row is not None]
 
 
@@ -54,18 +56,17 @@ def motors(scene: Scene) -> list[int]:
     return [j for j, joint in enumerate(scene.joints) if getattr(joint, "motor", None) is not None]
 
 
-def motor_velocities(scene: Scene) -> Array:
-    """[motors] rad/s or m/s in the scene."""
-    return np.array([scene.joints[j].motor.velocity for j in motors(scene)])  # type: ignore[union-attr]
+def motor_commands(scene: Scene) -> Array:
+    """[motors, 2] in the scene: velocity in rad/s or m/s; set point in rad or m, NaN: none."""
+    given: list[Any] = [getattr(scene.joints[j], "motor", None) for j in motors(scene)]
+    rows = [(m.velocity, np.nan if m.position is None else m.position) for m in given]
+    return np.array(rows, dtype=float).reshape(-1, 2)
 
 
 def _order(scene: Scene) -> list[int]:
     """Indices of all joints, such that joints that share a body stand close together."""
-    bodies = [
-        {scene.body_index(body) for body in (joint.a, joint.b) if body is not None}
-        for joint in scene.joints
-    ]
-    of_body: dict[int, list[int]] = {}
+    bodies = [set(scene.joint_ends(joint)) - {None} for joint in scene.joints]
+    of_body: dict[int | None, list[int]] = {}
     for j, ends in enumerate(bodies):
         for body in ends:
             of_body.setdefault(body, []).append(j)
@@ -87,12 +88,13 @@ def _order(scene: Scene) -> list[int]:
     return order[::-1]
 
 
-def _pose(scene: Scene, body: BodyName | None) -> tuple[Array, Array]:
-    """Position and rotation matrix of a body in the scene, or of the world."""
-    if body is None:
+def _pose(scene: Scene, solid: int | None) -> tuple[Array, Array]:
+    """Position and rotation matrix of a body or drive in the scene, or of the world."""
+    if solid is None:
         return np.zeros(3), np.eye(3)
-    solid = scene.bodies[scene.body_index(body)]
-    return np.array(solid.position), rotation_matrix(np.array(solid.orientation))
+    solids: tuple[Body | Drive, ...] = (*scene.bodies, *scene.driven_bodies)
+    found = solids[solid]
+    return np.array(found.position), rotation_matrix(np.array(found.orientation))
 
 
 class _Rows:
@@ -102,12 +104,12 @@ class _Rows:
         self.found: list[Any] = []
         self.free: Any = None
         joint = scene.joints[index]
-        a = scene.body_index(joint.a)
-        b = world if joint.b is None else scene.body_index(joint.b)
-        self.position_a, self.rotation_a = _pose(scene, joint.a)
-        self.position_b, self.rotation_b = _pose(scene, joint.b)
+        a, b = scene.joint_ends(joint)
+        self.position_a, self.rotation_a = _pose(scene, a)
+        self.position_b, self.rotation_b = _pose(scene, b)
         self.base: Any = np.zeros(1, dtype=JOINT_ROW)[0]
-        self.base["joint"], self.base["a"], self.base["b"] = index, a, b
+        self.base["joint"], self.base["a"] = index, a
+        self.base["b"] = world if b is None else b
         self.base["motor"], self.base["scale"] = -1, 1.0
         self.motor = motors(scene).index(index) if getattr(joint, "motor", None) else -1
         anchor = getattr(joint, "anchor", None)
@@ -179,8 +181,10 @@ class _Rows:
         self.free = self.found.pop()
         limits = joint.limits or (-np.inf, np.inf)
         if joint.motor is not None:  # before the limits, on which it would depend
-            limit = joint.motor.force_limit
-            self._add(kind, MOTOR, force_limit=limit, motor=self.motor, limits=limits, **values)
+            values_of_motor = {"motor": self.motor, "limits": limits}
+            for name in ("force_limit", "frequency"):
+                values_of_motor[name] = getattr(joint.motor, name)
+            self._add(kind, MOTOR, **values, **values_of_motor)
         if joint.limits is not None:
             self._add(kind, LOW_LIMIT, target=limits[0], **values)
             self._add(kind, HIGH_LIMIT, target=limits[1], **values)

@@ -94,7 +94,8 @@ class State(NamedTuple):
         candidate: [groups, slots] of candidate_dtype.
         wrench: [w, m, 6] force in N and torque in N m from the user, world frame; [0, m, 6] without
             `features.wrench`.
-        motor: [w, motors] rad/s or m/s, set velocity of each motor, in the order of the joints.
+        motor: [w, motors, 2] of each motor, in the order of the joints: rad/s or m/s; and rad or m,
+            the set point of a servo, NaN: none.
     """
 
     dynamic: Array
@@ -124,7 +125,7 @@ def allocate(model: Model, features: Features, count: int) -> State:
         sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
         candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
         wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
-        motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1)),
+        motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1, 2)),
     )
     state.dynamic["orientation"][..., 3] = 1.0
     state.half_pair["remaining_skin"] = -1.0

@@ -180,6 +180,7 @@ JOINT_ROW = np.dtype(
         ("target", "f8"),  # m or rad: length, or limit
         ("scale", "f8"),  # m or 1, size of what the value is computed from
         ("force_limit", "f8"),  # N or N m, of a motor
+        ("frequency", "f8"),  # 1/s, of a servo
         ("motor", "i8"),  # index in State.motor, or -1
         ("limits", "f8", (2,)),  # rad or m, of a motor's joint
         ("first", "i8"),  # first row that it is coupled to, and from there on

@@ -1,7 +1,9 @@
-"""Joints: what holds two bodies together, or a body to the world.
+"""Joints: what holds two bodies together, or a body to a drive or to the world.
 
 Anchors and axes are given in the world frame, at the poses that the bodies have in the scene. `b`
-None is the world. Two bodies with a joint don't touch each other unless `collide` is set.
+is a body, a drive, or None for the world. Drives come after the bodies in the order of indices; the
+fingers of a Gripper can't have joints. Two solids with a joint don't touch each other unless
+`collide` is set.
 """
 
 import math
@@ -14,25 +16,39 @@ from physics.scene.validation import Vector, instance, number, positive, vector
 
 @dataclass(frozen=True)
 class Motor:
-    """Drives a hinge or slider to a velocity, with a limited force.
+    """Drives a hinge or slider with a limited force, to a velocity or as a servo to a position.
 
     Args:
         force_limit: N m of a hinge, N of a slider, above zero.
         velocity: rad/s of a hinge, m/s of a slider: of `a` relative to `b`, along the axis. With
             zero the motor is a brake. `World.command_motors` changes it.
+        position: rad or m, set point of a servo; None: none, the velocity counts. A servo drives
+            with `frequency` times the distance to its set point. `World.move_motors` changes it.
+        frequency: 1/s, above zero. A servo whose force is too small to stop in 1/frequency s
+            overshoots.
 
     Raises:
-        TypeError, ValueError: a field is of the wrong type, not finite or not above zero.
+        TypeError, ValueError: a field is of the wrong type, not finite or not above zero; both a
+            velocity and a position.
     """
 
     force_limit: float
     velocity: float = 0.0
+    position: float | None = None
+    frequency: float = 30.0
 
     def __post_init__(self) -> None:
         """Checks every field."""
-        limit = positive("Motor.force_limit", self.force_limit)
-        object.__setattr__(self, "force_limit", limit)
+        for name in ("force_limit", "frequency"):
+            object.__setattr__(self, name, positive(f"Motor.{name}", getattr(self, name)))
         object.__setattr__(self, "velocity", number("Motor.velocity", self.velocity))
+        if self.position is not None:
+            object.__setattr__(self, "position", number("Motor.position", self.position))
+            if self.velocity != 0.0:
+                raise ValueError(
+                    f"Motor takes velocity or position, not both: got velocity={self.velocity}, "
+                    f"position={self.position}"
+                )
 
 
 @dataclass(frozen=True)
@@ -41,9 +57,9 @@ class BallJoint:
 
     Args:
         a: body, by index or name.
-        b: another body, or None for the world.
+        b: another body or a drive, by index or name; None: the world.
         anchor: the common point, world frame, m.
-        collide: whether the two bodies can touch each other.
+        collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
 
     Raises:
@@ -67,13 +83,13 @@ class Hinge:
 
     Args:
         a: body, by index or name.
-        b: another body, or None for the world.
+        b: another body or a drive, by index or name; None: the world.
         anchor: a point of the axis, world frame, m.
         axis: its direction, world frame; any length above zero.
         limits: (low, high) of the angle of `a` relative to `b`, rad, from -pi to pi; zero, the
             angle in the scene, lies between them. None: no limits.
         motor: drives the angle.
-        collide: whether the two bodies can touch each other.
+        collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
 
     Raises:
@@ -100,13 +116,13 @@ class Slider:
 
     Args:
         a: body, by index or name.
-        b: another body, or None for the world.
+        b: another body or a drive, by index or name; None: the world.
         axis: world frame; any length above zero. It is fixed to `b`.
         anchor: a point of `a` that moves along the axis, world frame, m; None: its centre.
         limits: (low, high) of the displacement of `a` relative to `b`, m; zero, the displacement in
             the scene, lies between them. None: no limits.
         motor: drives the displacement.
-        collide: whether the two bodies can touch each other.
+        collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
 
     Raises:
@@ -135,10 +151,10 @@ class Weld:
 
     Args:
         a: body, by index or name.
-        b: another body, or None for the world.
+        b: another body or a drive, by index or name; None: the world.
         anchor: point at which their positions are compared, world frame, m; None: the centre of
             `a`.
-        collide: whether the two bodies can touch each other.
+        collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
 
     Raises:
@@ -162,11 +178,11 @@ class Distance:
 
     Args:
         a: body, by index or name.
-        b: another body, or None for the world.
+        b: another body or a drive, by index or name; None: the world.
         length: m, above zero; None: the distance in the scene, which a given length must equal.
         anchor: the point of `a`, world frame, m; None: its centre.
         to_anchor: the point of `b`, world frame, m; None: its centre. Needed if `b` is the world.
-        collide: whether the two bodies can touch each other.
+        collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
 
     Raises:

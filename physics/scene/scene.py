@@ -94,10 +94,9 @@ class Scene:
             raise ValueError(f"{where}: PointSpring.to is the body itself, {to!r}")
 
     def _check_joint(self, where: str, joint: Joint) -> None:
-        """Raises ValueError if a joint has no two different bodies, or anchors that disagree."""
+        """Raises ValueError if a joint has no two different solids, or anchors that disagree."""
         kind = type(joint).__name__
-        a = self.body_index(joint.a, f"{where}: {kind}.a")
-        b = None if joint.b is None else self.body_index(joint.b, f"{where}: {kind}.b")
+        a, b = self.joint_ends(joint, f"{where}: {kind}.")
         if a == b:
             raise ValueError(f"{where}: {kind}.b is the same body as a, {joint.b!r}")
         if isinstance(joint, Distance):
@@ -110,20 +109,43 @@ class Scene:
                     f"{apart:.9g} m apart in the scene; give length=None or move a body"
                 )
 
+    def joint_ends(self, joint: Joint, field: str = "") -> tuple[int, int | None]:
+        """Indices of a joint's solids: bodies, then drives; None is the world.
+
+        Raises:
+            ValueError: `a` is no body, `b` no body or drive; the message begins with `field`.
+        """
+        a = self.body_index(joint.a, f"{field}a")
+        if joint.b is None:
+            return a, None
+        bodies, fingers = len(self.bodies), set()
+        for first, _ in self.grippers:
+            fingers |= {bodies + first, bodies + first + 1}
+        names = self.solid_names[: bodies + len(self.driven_bodies)]
+        index = names.index(joint.b) if joint.b in names else joint.b
+        if isinstance(index, int) and 0 <= index < len(names) and index not in fingers:
+            return a, index
+        listed = ", ".join(repr(name) for i, name in enumerate(names) if i not in fingers)
+        raise ValueError(
+            f"{field}b must be None for the world, or the name or index of a body or Drive, got "
+            f"{joint.b!r}; there are: {listed}"
+        )
+
     def distance_anchors(self, joint: Distance) -> tuple[Vector, Vector]:
         """Both ends of a Distance, world frame, m."""
-        a = self.bodies[self.body_index(joint.a)].position
-        b = ZERO if joint.b is None else self.bodies[self.body_index(joint.b)].position
-        return joint.anchor or a, joint.to_anchor or b
+        a, b = self.joint_ends(joint)
+        solids: tuple[Body | Drive, ...] = (*self.bodies, *self.driven_bodies)
+        other = ZERO if b is None else solids[b].position
+        return joint.anchor or self.bodies[a].position, joint.to_anchor or other
 
     @cached_property
     def jointed_pairs(self) -> frozenset[tuple[int, int]]:
-        """Pairs of bodies that don't touch each other because a joint connects them."""
+        """Pairs of solids that don't touch each other because a joint connects them."""
         pairs = set()
         for joint in self.joints:
-            if joint.b is not None and not joint.collide:
-                first, second = sorted((self.body_index(joint.a), self.body_index(joint.b)))
-                pairs.add((first, second))
+            a, b = self.joint_ends(joint)
+            if b is not None and not joint.collide:
+                pairs.add((min(a, b), max(a, b)))
         return frozenset(pairs)
 
     def body_index(self, body: BodyName, field: str = "body") -> int:

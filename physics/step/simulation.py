@@ -8,7 +8,7 @@ import numpy as np
 from physics.compiler.jit import LANES, columns
 from physics.model.build import build, expand_per_world, write_per_world
 from physics.model.features import ISOTROPIC, Features
-from physics.model.joints import motor_velocities
+from physics.model.joints import motor_commands
 from physics.model.pairs import Layout
 from physics.model.state import (
     DYNAMIC_STATE,
@@ -109,7 +109,7 @@ class Simulation:
             rows = dynamic[worlds, : self.bodies]  # a copy
             dynamic[worlds, : self.bodies] = self._moving(rows, inverse_mass, inertia)
         self.state.world["time"][worlds] = 0.0
-        self.state.motor[worlds] = motor_velocities(self.scene)
+        self.state.motor[worlds] = motor_commands(self.scene)
         if self.features.wrench:
             self.state.wrench[worlds] = 0.0
         self.forget(worlds)

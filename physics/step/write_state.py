@@ -60,6 +60,20 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
     simulation.forget(worlds)
 
 
+def write_motors(simulation: Simulation, name: str, values: Any) -> None:
+    """Writes the "velocity" or the "position" [count, motors] that motors drive to.
+
+    Raises:
+        ValueError: see `World.command_motors`.
+    """
+    motor = simulation.state.motor
+    if motor.shape[1] == 0:
+        raise ValueError(f"{name} needs a Hinge or Slider with a Motor in Scene.joints")
+    checked = array(name, values, motor.shape[:2])
+    motor[..., 0] = checked if name == "velocity" else 0.0
+    motor[..., 1] = checked if name == "position" else np.nan
+
+
 def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> dict[str, Array]:
     """Checks the given values and broadcasts them to arrays [chosen, ...].
 
@@ -111,11 +125,20 @@ def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> d
 def _check_joints(simulation: Simulation, new: Mapping[str, Array], worlds: Array) -> None:
     """Raises ValueError if new poses violate a joint: the next step would throw the bodies."""
     joints = simulation.scene.joints
-    if not joints or not ("position" in new or "orientation" in new) or not worlds.any():
+    moved = {"position", "orientation", "drive_position"} & set(new)
+    if not joints or not moved or not worlds.any():
         return
-    before = simulation.state.dynamic[worlds, : simulation.bodies]
-    poses = (new.get(name, before[name]) for name in ("position", "orientation"))
-    errors = pose_errors(simulation.base.joint_row, len(joints), *poses)
+    poses = simulation.state.dynamic[worlds]  # a copy
+    for name, field, first in (
+        ("position", "position", 0),
+        ("orientation", "orientation", 0),
+        ("drive_position", "position", simulation.bodies),
+    ):
+        if name in new:
+            poses[field][:, first : first + new[name].shape[1]] = new[name]
+    errors = pose_errors(
+        simulation.base.joint_row, len(joints), poses["position"], poses["orientation"]
+    )
     n, j = divmod(int(np.argmax(errors)), len(joints))
     if errors[n, j] > JOINT_TOLERANCE:
         name = joints[j].name or f"joint {j}"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from physics import Fidelity, Hinge, Motor, Scene, Slider, World
+from physics import Box, Drive, Fidelity, Hinge, Motor, Scene, Slider, World
 from tests.physics.constraints.jointed import (
     MASS,
     energy,
@@ -102,3 +102,38 @@ def test_worlds_have_motors_of_their_own_and_neighbours_change_no_bit():
     many.reset()
     many.advance(1.0)
     np.testing.assert_array_equal(many.position[0], many.position[18])
+
+
+def test_a_servo_turns_to_its_set_point_and_holds_a_load():
+    """It approaches as exp(-frequency t) where its force suffices."""
+    world = pendulum(1.0, Fidelity(substep=1e-3), motor=Motor(40.0, position=0.0, frequency=20.0))
+    world.move_motors(-0.3)
+    world.advance(0.2)
+    assert world.joint_position()[0, 0] == pytest.approx(-0.3 * (1 - math.exp(-4.0)), abs=5e-3)
+    world.advance(1.0)
+    assert world.joint_position()[0, 0] == pytest.approx(-0.3, abs=1e-6)
+    world.move_motors(math.pi - 1.0)  # upright
+    world.advance(1.5)
+    world.move_motors(-0.9 * math.pi)  # the shorter way, through pi
+    world.advance(0.05)
+    assert world.joint_position()[0, 0] > math.pi - 1.0
+    world.advance(1.0)
+    assert world.joint_position()[0, 0] == pytest.approx(-0.9 * math.pi, abs=1e-6)
+
+
+def test_a_body_on_a_drive_turns_with_a_limited_torque():
+    """A drive translates; a body on a hinge with a servo makes it turn."""
+    drive = Drive(Box((0.02, 0.02, 0.02)), mass=1.0, force_limit=50.0, name="carriage", mask=0)
+    wheel = ghost(position=(0, 0, 0.1))
+    joint = Hinge(0, "carriage", (0, 0, 0.1), (0, 0, 1), motor=Motor(1.0, position=0.0))
+    world = World(Scene([wheel], drives=[drive], joints=[joint]), Fidelity(substep=1e-3))
+    world.move_drives((0.3, 0.0, 0.0), 0.5)
+    world.move_motors(1.2)
+    world.advance(1.5)
+    assert world.joint_position()[0, 0] == pytest.approx(1.2, abs=1e-6)
+    sag = MASS * G / (1.0 * 60.0**2)  # of the servo, under the body's weight
+    np.testing.assert_allclose(world.drive_position[0, 0], (0.3, 0, -sag), atol=1e-5)
+    np.testing.assert_allclose(world.position[0, 0], (0.3, 0, 0.1 - sag), atol=1e-5)
+    assert world.joint_error().max() < 1e-12
+    with pytest.raises(ValueError, match="violate joint 0, a Hinge between 0 and 'carriage'"):
+        world.set_state(drive_position=(0.0, 0.0, 0.0))
