@@ -1,7 +1,7 @@
 """A rigid-body engine on numba. It simulates thousands of worlds at once on CPU threads."""
 
 from physics.analysis.diagnostics import Contacts
-from physics.errors import ContactOverflow, SimulationDiverged
+from physics.errors import ContactOverflow, SimulationDiverged, StepVanished
 from physics.model.features import Features
 from physics.scene.compound import Compound
 from physics.scene.drives import Drive, Gripper
@@ -47,6 +47,7 @@ __all__ = [
     "Snapshot",
     "Sphere",
     "Static",
+    "StepVanished",
     "Weld",
     "World",
 ]

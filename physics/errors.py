@@ -15,6 +15,8 @@ class SimulationDiverged(ArithmeticError):
         worlds: indices of all worlds that diverged. The other worlds are unaffected.
     """
 
+    _what = "became non-finite"
+
     def __init__(
         self, world: int, body: int, name: str, time: float, cause: str, worlds: list[int]
     ) -> None:
@@ -23,7 +25,7 @@ class SimulationDiverged(ArithmeticError):
         self.cause, self.worlds = cause, worlds
         more = f" ({len(worlds)} worlds in total)" if len(worlds) > 1 else ""
         super().__init__(
-            f"world {world}{more}: {name} became non-finite at t = {time:.6g} s; likely cause: "
+            f"world {world}{more}: {name} {self._what} at t = {time:.6g} s; likely cause: "
             f"{cause}. The other worlds are unaffected; restore(), reset() or set_state() makes "
             "this one usable again"
         )
@@ -32,6 +34,15 @@ class SimulationDiverged(ArithmeticError):
         """Pickles the constructor's arguments, so worker processes can pass the error on."""
         parts = (self.world, self.body, self.name, self.time, self.cause, self.worlds)
         return type(self), parts, vars(self)  # with its notes
+
+
+class StepVanished(SimulationDiverged):
+    """A world needs steps shorter than the adaptive integrator takes.
+
+    The state of such a world is finite: it is the one before the step that failed, at `time`.
+    """
+
+    _what = "needs steps shorter than a millionth of Fidelity.substep"
 
 
 class ContactOverflow(RuntimeError):

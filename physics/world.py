@@ -10,6 +10,7 @@ from physics import snapshot
 from physics.analysis import diagnostics, energies, field_limits, joints, readouts, stability
 from physics.analysis.diagnostics import Contacts
 from physics.analysis.failures import failure
+from physics.analysis.integrator_limits import check_integrator
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
@@ -43,7 +44,8 @@ class World:
     Raises:
         TypeError: an argument of the wrong type.
         ValueError: an argument out of range; a substep that is too long for the scene, see
-            `physics.analysis.step_limits.check_step`.
+            `physics.analysis.step_limits.check_step`; an integrator that can't advance it, see
+            `physics.analysis.integrator_limits.check_integrator`.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class World:
         self._simulation = Simulation(
             scene, self.fidelity, self.count, self.threads, per_world_parameters
         )
+        check_integrator(scene, self.fidelity, self._simulation.base)
         if not allow_unstable:
             check_step(scene, self.fidelity, self._simulation.base, self.features)
         self._limits = ParameterLimits(scene, self.fidelity)
@@ -81,7 +84,7 @@ class World:
     # --- time ---------------------------------------------------------------------------------
 
     def advance(self, time: float, worlds: Any = None) -> None:
-        """Advances worlds by `time` s, in whole substeps no longer than the fidelity's.
+        """Advances worlds by `time` s, in whole steps no longer than the fidelity's substep.
 
         Args:
             time: s.
@@ -90,7 +93,8 @@ class World:
         Raises:
             TypeError, ValueError: `time` isn't a positive finite number; a bad mask.
             SimulationDiverged: a world became non-finite now, or did before and was neither reset
-                nor left out; the others have advanced.
+                nor left out; the others have advanced. StepVanished, a kind of it: one needs
+                shorter steps than the adaptive integrator takes.
             ContactOverflow: more pairs of particles are within the skin than there is room for. If
                 another world diverged in the same call, this is a note of that error.
         """
@@ -355,6 +359,23 @@ class World:
         return read_only(self._simulation.state.world["time"])
 
     @property
+    def steps(self) -> Array:
+        """[count] steps that the adaptive integrator took since the state was set: read-only.
+
+        Tries that it rejected don't count.
+
+        Raises:
+            ValueError: another integrator, whose steps are equal: `advance(time)` takes as few as
+                are no longer than `Fidelity.substep`.
+        """
+        if self.fidelity.integrator != "adaptive":
+            raise ValueError(
+                'steps are counted with Fidelity(integrator="adaptive"); '
+                f"{self.fidelity.integrator!r} takes equal steps of at most Fidelity.substep"
+            )
+        return read_only(self._simulation.state.pace["accepted"])
+
+    @property
     def position(self) -> Array:
         """[count, bodies, 3] m, centres of mass: a read-only view of the state."""
         return read_only(self._simulation.state.dynamic["position"][:, : self._simulation.bodies])
@@ -557,7 +578,9 @@ class World:
         self._refresh()
         simulation, index = self._simulation, self._world_index(world)
         contacts = stability.of_contacts(simulation.model, self.features, simulation.state, index)
-        fields, _ = field_limits.longest_step(self.scene, simulation.model.of_world(index))
+        fields, _ = field_limits.longest_step(
+            self.scene, simulation.model.of_world(index), self.fidelity.integrator
+        )
         # squared frequencies add at most
         return (
             1.0 / math.sqrt(1.0 / contacts**2 + 1.0 / fields**2) if fields < math.inf else contacts

@@ -113,6 +113,7 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
         candidate=state.candidate[alone].copy(),  # their memory must not change
         wrench=state.wrench[worlds].copy(),
         motor=state.motor[worlds].copy(),
+        pace=state.pace[worlds].copy(),
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
     everyone = np.ones(len(copied.world), dtype=bool)

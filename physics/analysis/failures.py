@@ -1,7 +1,7 @@
 """The error of worlds whose last steps failed."""
 
 from physics.analysis.step_limits import cause_of_divergence
-from physics.errors import ContactOverflow, SimulationDiverged
+from physics.errors import ContactOverflow, SimulationDiverged, StepVanished
 from physics.scene.parameters import with_parameters
 from physics.step.simulation import Simulation
 
@@ -35,4 +35,11 @@ def _divergence(simulation: Simulation, diverged: list[int]) -> SimulationDiverg
     cause = cause_of_divergence(scene, simulation.fidelity, model, features, h)
     body = int(status["diverged"]) - 1
     name = simulation.scene.solid_names[body]
+    if simulation.state.pace.size and simulation.state.pace[world]["vanished"]:
+        cause = (
+            "a force that jumps or a singularity, such as the centre of an attractor, or a "
+            f"Fidelity.tolerance of {simulation.fidelity.tolerance:g} that is below round-off; "
+            "raise the tolerance"
+        )
+        return StepVanished(world, body, name, float(status["time"]), cause, diverged)
     return SimulationDiverged(world, body, name, float(status["time"]), cause, diverged)

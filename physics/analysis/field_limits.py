@@ -8,12 +8,14 @@ share a body act together at most as the matrix
 
 whose largest eigenvalue bounds omega^2. The same matrix of the damping bounds gamma, to which the
 linear drag over mass of a body adds. A step is stable if x'' = -omega^2 x - gamma x' is: the scheme
-of `motion.fields` is linear in (x, v, a), with the spectral radius of its matrix at most 1. Pull
-and drag that grow with closeness or speed (attractors, quadratic drag) have no such limit.
+of the integrator, with the velocities of `motion.fields`, is linear in (x, v, a), with the spectral
+radius of its matrix at most 1. Pull and drag that grow with closeness or speed (attractors,
+quadratic drag) have no such limit. The adaptive integrator needs none: its error control shortens
+the steps.
 """
 
 import math
-from itertools import product
+from itertools import accumulate, product
 
 import numpy as np
 
@@ -48,17 +50,40 @@ def _coupling(rows: Array, model: Model, column: str) -> tuple[float, int]:
     return float(values[-1]), int(np.abs(vectors[:, -1]).argmax())
 
 
-def _is_stable(square: float, gamma: float, h: float) -> bool:
-    """Whether a step of x'' = -square x - gamma x' in (x, v, a) doesn't grow."""
-    half = np.array([[0.0, 1.0, 0.5 * h]])  # velocity in the middle of the step
-    x = np.array([[1.0, 0.0, 0.0]]) + h * half
-    a = -square * x - gamma * (half + np.array([[0.0, 0.0, 0.5 * h]]))
-    matrix = np.concatenate([x, half + 0.5 * h * a, a])
+def _is_stable(square: float, gamma: float, h: float, integrator: str) -> bool:
+    """Whether a step of x'' = -square x - gamma x' doesn't grow."""
+    matrix = _STEPS[integrator](square, gamma, h)
     return bool(np.abs(np.linalg.eigvals(matrix)).max() <= 1.0 + 1e-9)
 
 
-def longest_step(scene: Scene, model: Model) -> tuple[float, int]:
+def _midpoint(square: float, gamma: float, h: float) -> Array:
+    """The step of (x, v, a)."""
+    half = np.array([[0.0, 1.0, 0.5 * h]])  # velocity in the middle of the step
+    x = np.array([[1.0, 0.0, 0.0]]) + h * half
+    a = -square * x - gamma * (half + np.array([[0.0, 0.0, 0.5 * h]]))
+    return np.concatenate([x, half + 0.5 * h * a, a])
+
+
+def _euler(square: float, gamma: float, h: float) -> Array:
+    """The step of (x, v)."""
+    v = np.array([[-h * square, 1.0 - h * gamma]])
+    return np.concatenate([np.array([[1.0, 0.0]]) + h * v, v])
+
+
+def _rk4(square: float, gamma: float, h: float) -> Array:
+    """The step of (x, v): the exponential's series to the fourth power."""
+    A = h * np.array([[0.0, 1.0], [-square, -gamma]])
+    powers = accumulate(range(1, 5), lambda term, n: term @ A / n, initial=np.eye(2))
+    return np.asarray(sum(powers))
+
+
+_STEPS = {"midpoint": _midpoint, "euler": _euler, "rk4": _rk4}
+
+
+def longest_step(scene: Scene, model: Model, integrator: str) -> tuple[float, int]:
     """Longest stable step in s, inf if nothing limits it, and the index of the limiting field."""
+    if integrator not in _STEPS:
+        return math.inf, 0
     rows = model.field
     springs = rows[rows["kind"] == POINT_SPRING]
     square, gamma, stiff, damped = 0.0, 0.0, 0, 0
@@ -75,7 +100,8 @@ def longest_step(scene: Scene, model: Model) -> tuple[float, int]:
     low, high = 0.0, _LONGEST
     while high - low > 1e-4 * high:
         middle = math.sqrt(max(low, 1e-12) * high)
-        low, high = (middle, high) if _is_stable(square, gamma + most, middle) else (low, middle)
+        stable = _is_stable(square, gamma + most, middle, integrator)
+        low, high = (middle, high) if stable else (low, middle)
     drag = max(gamma, most) * low > math.sqrt(square) * low
     if not drag or gamma >= most:
         index = damped if drag else stiff

@@ -138,7 +138,7 @@ def _check_servos(scene: Scene, fidelity: Fidelity, model: Model) -> None:
 
 
 def _check_fields(scene: Scene, fidelity: Fidelity, model: Model) -> None:
-    longest, limiting = field_limits.longest_step(scene, model)
+    longest, limiting = field_limits.longest_step(scene, model, fidelity.integrator)
     if fidelity.substep > longest:
         raise ValueError(
             f"Scene.fields[{limiting}], {scene.fields[limiting]!r}, makes the substep of "

@@ -8,9 +8,9 @@ the same way where the step would pass it, and only pushes.
 from physics.compiler.jit import LANES, stage
 from physics.constraints.envelope import factor, solve
 from physics.constraints.rows import add_along_row, linearise_rows, measure_rows
+from physics.integrators.drift import make_drift
 from physics.model.features import cached_by_features
 from physics.model.tables import EQUALITY, MOTOR
-from physics.motion.integrator import make_drift
 from physics.motion.kinematics import write_rotation
 
 # relative to the lengths that a value is computed from: round-off

@@ -33,7 +33,7 @@ from physics.impulse.point_impulses import (
 from physics.impulse.restitution import make_impacts
 from physics.impulse.sweep import make_sweep
 from physics.model.contact_memory import contact_memory
-from physics.model.features import cached_by_features
+from physics.model.features import EULER, cached_by_features
 from physics.model.lanes import record_contacts
 from physics.motion.drives import make_finger_velocity_coupling
 from physics.motion.vectors import rotated_back, tensor_times
@@ -176,6 +176,8 @@ def make_impulses(features):
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
+    # steps by which velocities lag positions; with semi-implicit Euler they are of the same time
+    lag = 0.0 if features.integrator == EULER else 0.5
 
     @stage
     def sweep_all(model, workspace, h, soft):
@@ -220,9 +222,9 @@ def make_impulses(features):
             if workspace.half_pair[k].slots > 0:
                 contact_rows(model, state, workspace, g, k, workspace.lane[0].updates_memory, h)
         # velocities are half a step old; bodies collide with the present ones
-        apply_known_forces(model, workspace, 0.5 * drifted)
+        apply_known_forces(model, workspace, lag * drifted)
         impacts(model, workspace, h, drifted == 0.0)
-        apply_known_forces(model, workspace, -0.5 * drifted)
+        apply_known_forces(model, workspace, -lag * drifted)
         clear_hold(model, workspace)
         begin_hold(model, workspace, False, 0.0)
         sweep_all(model, workspace, h, False)

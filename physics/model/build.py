@@ -25,7 +25,7 @@ from physics.model.tables import (
     HIDDEN_FACE,
     Model,
 )
-from physics.scene.fidelity import Fidelity
+from physics.scene.fidelity import INTEGRATORS, Fidelity
 from physics.scene.fields import PointSpring
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.parameters import Parameters
@@ -218,6 +218,7 @@ def _features(
         for row in model.half_pair
     )
     return Features(
+        integrator=INTEGRATORS.index(fidelity.integrator),
         impulse=impulse,
         dashpot=not impulse and fidelity.damping == "dashpot" and len(model.half_pair) > 0,
         friction=friction,

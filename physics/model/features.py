@@ -11,12 +11,15 @@ from typing import Any, NamedTuple, TypeVar
 
 # rotation of bodies: none; with equal principal moments of inertia; general
 NO_ROTATION, ISOTROPIC, GENERAL = range(3)
+# values of `Fidelity.integrator`
+MIDPOINT, EULER, RK4, ADAPTIVE = range(4)
 
 
 class Features(NamedTuple):
     """Compile-time switches. The machine code and the state omit features that are switched off.
 
     Attributes:
+        integrator: MIDPOINT, EULER, RK4 or ADAPTIVE.
         impulse: impulse law instead of the spring law.
         dashpot: linear damping instead of Hunt-Crossley damping.
         friction: at least one pair has friction; adds the tangential law and its history.
@@ -35,6 +38,7 @@ class Features(NamedTuple):
         per_world_parameters: masses, materials and sizes can differ between worlds.
     """
 
+    integrator: int
     impulse: bool
     dashpot: bool
     friction: bool

@@ -6,7 +6,7 @@ import numpy as np
 
 from physics.compiler.jit import LANES, aligned_zeros, columns
 from physics.model.contact_memory import contact_memory
-from physics.model.features import Features, cached_by_features
+from physics.model.features import ADAPTIVE, Features, cached_by_features
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -62,6 +62,17 @@ STATUS = np.dtype(
     align=True,
 )
 
+# one row per world, of the adaptive pair
+PACE = np.dtype(
+    [
+        ("step", "f8"),  # s, proposed for the next step
+        ("accepted", "i8"),  # steps since the state was set
+        ("rejected", "i8"),  # tries that were too long
+        ("vanished", "i8"),  # 1: the tolerance would need steps that are too short
+    ],
+    align=True,
+)
+
 
 @cached_by_features
 def candidate_dtype(features: Features) -> np.dtype:
@@ -96,6 +107,7 @@ class State(NamedTuple):
             `features.wrench`.
         motor: [w, motors, 2] of each motor, in the order of the joints: rad/s or m/s; and rad or m,
             the set point of a servo, NaN: none.
+        pace: [w] of PACE; [0] unless the integrator is adaptive.
     """
 
     dynamic: Array
@@ -106,6 +118,7 @@ class State(NamedTuple):
     candidate: Array
     wrench: Array
     motor: Array
+    pace: Array
 
     @property
     def nbytes(self) -> int:
@@ -126,6 +139,7 @@ def allocate(model: Model, features: Features, count: int) -> State:
         candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
         wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
         motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1, 2)),
+        pace=np.zeros(count if features.integrator == ADAPTIVE else 0, PACE),
     )
     state.dynamic["orientation"][..., 3] = 1.0
     state.half_pair["remaining_skin"] = -1.0

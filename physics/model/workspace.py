@@ -9,7 +9,7 @@ import numpy as np
 
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.contact_memory import contact_memory
-from physics.model.features import Features, cached_by_features
+from physics.model.features import ADAPTIVE, RK4, Features, cached_by_features
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -140,6 +140,36 @@ LANE = np.dtype(
     align=True,
 )
 
+# rows of a state of (c, P, q, L)
+POSITION, MOMENTUM, ORIENTATION, ANGULAR_MOMENTUM, STATE_ROWS = 0, 3, 6, 10, 13
+MOST_STAGES = 7  # of a Runge-Kutta method
+
+# one row per body, of Runge-Kutta methods
+TRIAL = np.dtype(
+    [
+        ("start", "f8", (STATE_ROWS, LANES)),  # state at the start of the step
+        ("rate", "f8", (MOST_STAGES, STATE_ROWS, LANES)),  # its rates at each stage
+        ("total", "f8", (STATE_ROWS, LANES)),  # sum of the rates, each times its coefficient
+    ],
+    align=True,
+)
+
+# a single row, of Runge-Kutta methods
+LANE_PACE = np.dtype(
+    [
+        ("step", "f8", (LANES,)),  # s, of the step that is tried; 0: the lane rests
+        # of the adaptive pair
+        ("proposal", "f8", (LANES,)),  # s, of the next step
+        ("done", "f8", (LANES,)),  # s of this call
+        ("error", "f8", (LANES,)),  # 1/s, see `runge_kutta.make_largest`
+        ("body", "i8", (LANES,)),  # the one with the largest error
+        ("accepted", "i8", (LANES,)),  # steps of this call
+        ("rejected", "i8", (LANES,)),
+        ("vanished", "i8", (LANES,)),  # 1: a step would have to be too short
+    ],
+    align=True,
+)
+
 
 # one row per scalar constraint of a joint, see constraints/rows.py
 JOINT_WORK = np.dtype(
@@ -195,6 +225,8 @@ class Workspace(NamedTuple):
         joint: [rows of joints] of JOINT_WORK.
         joint_factor: [entries, LANES] off the diagonal, see constraints/envelope.py.
         start_pose: [dynamic bodies] of POSE; with joints.
+        trial: [dynamic bodies] of TRIAL; Runge-Kutta methods.
+        pace: [1] of LANE_PACE; Runge-Kutta methods.
     """
 
     solid: Array
@@ -209,11 +241,14 @@ class Workspace(NamedTuple):
     joint: Array
     joint_factor: Array
     start_pose: Array
+    trial: Array
+    pace: Array
 
     @classmethod
     def of(cls, model: Model, features: Features) -> "Workspace":
         """Working arrays for a model."""
         half_pair, impulse = model.half_pair, features.impulse
+        trials = features.integrator in (RK4, ADAPTIVE)
         longest = int(half_pair["slot_count"].max(initial=0))
         solids = len(model.dynamic) + len(model.static)
         slots = int(half_pair["slot_count"].sum())
@@ -232,4 +267,6 @@ class Workspace(NamedTuple):
             joint=aligned_zeros(len(rows), JOINT_WORK),
             joint_factor=aligned_zeros((entries, LANES), np.dtype(float)),
             start_pose=aligned_zeros(joints * len(model.dynamic), POSE),
+            trial=aligned_zeros(len(model.dynamic) if trials else 0, TRIAL),
+            pace=aligned_zeros(1 if trials else 0, LANE_PACE),
         )

@@ -10,6 +10,9 @@ LAWS = ("spring", "impulse")
 GEOMETRIES = ("shape", "particle")
 DAMPINGS = ("hunt_crossley", "dashpot")
 FRICTIONS = ("coulomb", "viscous")
+INTEGRATORS = ("midpoint", "euler", "rk4", "adaptive")
+
+_TOLERANCE = 1e-6  # 1/s, of the adaptive integrator
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,14 @@ class Fidelity:
         rounding: radius of a box's edges, as a fraction of the box's smallest half width.
         skin: separation at which a sample becomes a broadphase candidate, as a fraction of the
             smallest width of the two solids; statics and grounds don't count.
+        integrator: "midpoint": kick-drift-kick, and the midpoint rule for the rotation; second
+            order. "euler": semi-implicit Euler; first order. "rk4": the classical Runge-Kutta
+            method of fourth order. "adaptive": the Runge-Kutta pair of Dormand and Prince, with
+            steps that keep to a tolerance, for each world by itself. The last two evaluate forces
+            at trial states, so they are for scenes in which nothing can touch and without drives.
+        tolerance: 1/s, error per second of the adaptive integrator: of positions in m, of rotations
+            in rad, of velocities in m/s and of angular velocities in rad/s. 1e-6 if None. Others
+            take none.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type, out of range or not supported by the
@@ -61,6 +72,8 @@ class Fidelity:
     spacing: float = 0.5
     rounding: float = 0.025
     skin: float = 0.1
+    integrator: str = "midpoint"
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         """Checks every field."""
@@ -74,6 +87,8 @@ class Fidelity:
                     f"Fidelity.{name} {getattr(self, name)!r} requires law='spring'; with "
                     f"law='impulse' omit {name}"
                 )
+        choice("Fidelity.integrator", self.integrator, INTEGRATORS)
+        self._check_tolerance()
         object.__setattr__(self, "substep", positive("Fidelity.substep", self.substep))
         substeps = integer("Fidelity.collision_substeps", self.collision_substeps, low=1)
         object.__setattr__(self, "collision_substeps", substeps)
@@ -87,6 +102,19 @@ class Fidelity:
             with_law = f" with law={self.law!r}" if name == "contact_resolution" else ""
             value = number(f"Fidelity.{name}{with_law}", getattr(self, name), low=low, high=high)
             object.__setattr__(self, name, value)
+
+    def _check_tolerance(self) -> None:
+        """Sets the default tolerance of the adaptive integrator; others have none."""
+        if self.integrator != "adaptive":
+            if self.tolerance is not None:
+                raise ValueError(
+                    f"Fidelity.tolerance {self.tolerance!r} requires integrator='adaptive'; with "
+                    f"integrator={self.integrator!r} omit tolerance, Fidelity.substep sets the step"
+                )
+            return
+        value = _TOLERANCE if self.tolerance is None else self.tolerance
+        value = number("Fidelity.tolerance", value, low=1e-12, high=1.0)
+        object.__setattr__(self, "tolerance", value)
 
     def to_json(self) -> str:
         """The fidelity as JSON text, from which `from_json` builds an equal one."""

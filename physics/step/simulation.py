@@ -27,6 +27,7 @@ from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.solids import Body
+from physics.step.adaptive_steps import make_adaptive_advance
 from physics.step.readout import WIDTH, Readout, make_readout
 from physics.step.threads import run_in_blocks
 from physics.step.time_layers import make_advance, substep_count
@@ -120,6 +121,8 @@ class Simulation:
         self.changed()
         state.world["needs_refresh"][worlds] = STARTS_ANEW
         state.world["diverged"][worlds] = 0
+        if state.pace.size > 0:
+            state.pace[worlds] = 0
         touch = state.touch[..., : self.count]
         touch[:, NORMAL_FORCE, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
         state.world["overflow"][worlds] = 0
@@ -298,7 +301,12 @@ class Simulation:
         self.forget(worlds)
 
     def _find_kernels(self) -> None:
-        self._advance = make_advance(self.features)
+        tolerance = self.fidelity.tolerance
+        self._advance = (
+            make_advance(self.features)
+            if tolerance is None
+            else make_adaptive_advance(self.features, tolerance)
+        )
         self._readout = make_readout(self.features)
 
     def __getstate__(self) -> dict[str, Any]:

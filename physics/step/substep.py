@@ -6,12 +6,12 @@ from physics.compiler.jit import sequence
 from physics.constraints.joint_drift import make_joint_drift
 from physics.constraints.joint_forces import make_joint_forces
 from physics.impulse.solver import make_impulses
-from physics.model.features import Features, cached_by_features
+from physics.integrators.kick import make_kick
+from physics.model.features import EULER, Features, cached_by_features
 from physics.model.lanes import end_refresh
 from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.fields import make_fields, make_present_velocities, make_wrenches
 from physics.motion.gravity import gravity
-from physics.motion.integrator import make_kick
 from physics.motion.kinematics import make_kinematics
 from physics.spring.contacts import make_contacts
 
@@ -21,8 +21,10 @@ def make_forces(features: Features):
     """Sequence that computes the forces at the present positions.
 
     Velocities are those of the last drift, which took `drifted` s, so they lag positions by half of
-    it. A substep takes `h` s; impulses act for `span` s.
+    it; with semi-implicit Euler they count as those of its end. A substep takes `h` s; impulses act
+    for `span` s.
     """
+    lag = 0.0 if features.integrator == EULER else 1.0
     present_velocities, fields = make_present_velocities(features), make_fields(features)
     wrenches, drives = make_wrenches(features), make_drives(features)
     couple_fingers = make_finger_coupling(features)
@@ -31,7 +33,7 @@ def make_forces(features: Features):
 
     @sequence
     def forces(model, state, workspace, g, h, span, drifted, elapsed):
-        present_velocities(model, workspace, drifted)
+        present_velocities(model, workspace, lag * drifted)
         gravity(model, workspace)
         fields(model, workspace)
         wrenches(state, workspace, g)
@@ -55,15 +57,18 @@ def make_substep(features: Features):
     compound_frames = make_compound_frames(features)
     broadphase = make_broadphase(features)
     forces = make_forces(features)
+    euler = features.integrator == EULER
+    # of a kick before the drift; the rest comes after the new forces
+    before = 1.0 if euler else 0.5
     # A spring's force follows from the positions. Impulses belong to a time: in a refresh, to that
-    # of the half kick that comes first
-    refresh_span = 0.5 if features.impulse else 0.0
+    # of the kick that comes first
+    refresh_span = before if features.impulse else 0.0
 
     @sequence
     def substep(model, state, workspace, g, h, elapsed, starts_collision_step, refresh):
         """`refresh`: only computes the forces of states that were set from outside."""
         if not refresh:
-            kick(model, workspace, 0.5 * h)
+            kick(model, workspace, before * h)
             drift(model, workspace, h)
         kinematics(model, workspace)
         compound_frames(model, workspace)
@@ -73,7 +78,7 @@ def make_substep(features: Features):
         forces(model, state, workspace, g, h, span, drifted, elapsed)
         if refresh:
             end_refresh(model, state, workspace, g)
-        else:
+        elif not euler:
             kick(model, workspace, 0.5 * h)
 
     return substep

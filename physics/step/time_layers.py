@@ -11,10 +11,11 @@ from functools import cache
 from physics.collision.broadphase import make_forget
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
-from physics.model.features import Features, cached_by_features
+from physics.model.features import RK4, Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames
 from physics.step.readout import make_write_rows
+from physics.step.runge_kutta_step import make_runge_kutta_substep
 from physics.step.substep import make_substep
 
 # m, kg m/s or kg m^2/s, in sum: beyond it a dynamic body counts as diverged
@@ -75,7 +76,8 @@ def make_advance(features: Features):
     """
     sources = SOURCES
     constants, forget = make_constants(features), make_forget(features)
-    substep = make_substep(features)
+    trials = features.integrator == RK4
+    substep = make_runge_kutta_substep(features) if trials else make_substep(features)
     write_back = make_write_back(features)
 
     @large_entry

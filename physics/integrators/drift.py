@@ -1,73 +1,15 @@
-"""Kick-drift-kick for translation, the midpoint rule for rotation: second order.
-
-The state is (x, q, P, L): position, quaternion, momentum, angular momentum. A substep is half a
-kick, a drift, new forces, half a kick. Forces that depend on velocity see the half-step velocity of
-the drift. Without torque L stays bitwise constant while omega = J^-1 L does not: the midpoint rule
-rotates by the omega that belongs to the orientation half a step ahead.
-
-The midpoint rule does not conserve energy where L would rotate the body by a large angle about its
-slimmest axis. Such a rotation is made in up to MOST_PARTS parts of at most SMALL_ROTATION,
-0.3 rad, which suffices for 30 rad per substep (evidence: docs/decisions).
-"""
+"""Drift: bodies and drives move and rotate by their momenta, by the rule of the integrator."""
 
 import math
 
 from physics.compiler.jit import LANES, at, stage
-from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
-from physics.motion.kinematics import angular_velocity_of
+from physics.integrators.euler import make_euler_rotation
+from physics.integrators.midpoint import make_midpoint_rotation
+from physics.model.features import EULER, GENERAL, NO_ROTATION, cached_by_features
 from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far
 
 # largest number of parts of a rotation; beyond 30 rad per substep they exceed SMALL_ROTATION
 MOST_PARTS = 100.0
-
-
-@cached_by_features
-def make_kick(features):
-    """Stage that adds the impulses of the present force and torque over a time."""
-    rotation = features.rotation
-
-    @stage
-    def kick(model, workspace, time):
-        for m in range(model.dynamic.shape[0]):
-            solid = workspace.solid[m]
-            P, L = solid.momentum, solid.angular_momentum
-            force, torque = solid.force, solid.torque
-            for i in range(LANES):
-                P[0, i] += time * force[0, i]
-                P[1, i] += time * force[1, i]
-                P[2, i] += time * force[2, i]
-            if rotation != NO_ROTATION and model.dynamic[m].is_body:
-                for i in range(LANES):
-                    L[0, i] += time * torque[0, i]
-                    L[1, i] += time * torque[1, i]
-                    L[2, i] += time * torque[2, i]
-
-    return kick
-
-
-@cached_by_features
-def make_midpoint_rotation(features, rotate_quaternion):
-    """Formula of the midpoint rule: returns the new quaternion and the omega it used.
-
-    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2). `features.rotation` is
-    NO_ROTATION, ISOTROPIC (equal moments) or GENERAL. `rotate_quaternion` is that of small angles
-    or, for any angle, `rotate_quaternion_far`.
-    """
-    rotation = features.rotation
-
-    @stage
-    def midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, time):
-        if rotation == GENERAL:
-            half = 0.5 * time
-            ox, oy, oz = angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
-            hx, hy, hz, hw = rotate_quaternion(x, y, z, w, half * ox, half * oy, half * oz)
-            ox, oy, oz = angular_velocity_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
-        else:  # equal moments: omega is parallel to L
-            ox, oy, oz = jx * lx, jx * ly, jx * lz
-        x, y, z, w = rotate_quaternion(x, y, z, w, time * ox, time * oy, time * oz)
-        return x, y, z, w, ox, oy, oz
-
-    return midpoint_rotation
 
 
 @stage
@@ -85,8 +27,11 @@ def make_drift(features):
     whose farthest point is `core_reach` from the centre.
     """
     rotation = features.rotation
-    midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
-    midpoint_rotation_far = make_midpoint_rotation(features, rotate_quaternion_far)
+    euler = features.integrator == EULER
+    in_parts = rotation == GENERAL and not euler
+    make_rotation = make_euler_rotation if euler else make_midpoint_rotation
+    rotated = make_rotation(features, rotate_quaternion)
+    rotated_far = make_rotation(features, rotate_quaternion_far)
 
     @stage
     def drift(model, workspace, time):
@@ -113,9 +58,7 @@ def make_drift(features):
                 square, span = small_rotation_limit(jx, jy, jz, time), time * at(reaches, i)
                 x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                 lx, ly, lz = L[0, i], L[1, i], L[2, i]
-                nx, ny, nz, nw, ox, oy, oz = midpoint_rotation(
-                    x, y, z, w, jx, jy, jz, lx, ly, lz, time
-                )
+                nx, ny, nz, nw, ox, oy, oz = rotated(x, y, z, w, jx, jy, jz, lx, ly, lz, time)
                 small = lx * lx + ly * ly + lz * lz <= square
                 q[0, i] = nx if small else x
                 q[1, i] = ny if small else y
@@ -137,12 +80,17 @@ def make_drift(features):
                         far_by = math.sqrt((lx * lx + ly * ly + lz * lz) / square)
                         parts = 1
                         # equal moments need one part; so does NaN, which ceil could not convert
-                        if rotation == GENERAL and far_by > 1.0 and not jx == jy == jz:
+                        if (
+                            not euler
+                            and rotation == GENERAL
+                            and far_by > 1.0
+                            and not jx == jy == jz
+                        ):
                             parts = math.ceil(min(MOST_PARTS, far_by))
                         x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                         fastest = 0.0
                         for _ in range(parts):
-                            x, y, z, w, ox, oy, oz = midpoint_rotation_far(
+                            x, y, z, w, ox, oy, oz = rotated_far(
                                 x, y, z, w, jx, jy, jz, lx, ly, lz, time / parts
                             )
                             speed = abs(ox) + abs(oy) + abs(oz)

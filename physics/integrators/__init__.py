@@ -1,0 +1,1 @@
+"""Integrators: one file per method that `Fidelity.integrator` names; kick and drift are shared."""
