@@ -80,12 +80,7 @@ def make_drift(features):
                         far_by = math.sqrt((lx * lx + ly * ly + lz * lz) / square)
                         parts = 1
                         # equal moments need one part; so does NaN, which ceil could not convert
-                        if (
-                            not euler
-                            and rotation == GENERAL
-                            and far_by > 1.0
-                            and not jx == jy == jz
-                        ):
+                        if in_parts and far_by > 1.0 and not jx == jy == jz:
                             parts = math.ceil(min(MOST_PARTS, far_by))
                         x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                         fastest = 0.0

@@ -29,6 +29,20 @@ def rows_of(features: Features) -> int:
     return ORIENTATION if features.rotation == NO_ROTATION else STATE_ROWS
 
 
+@stage
+def place(c, i):
+    """Where row c of a state, of its rates or of a sum of them stands in lane i."""
+    return c * LANES + i
+
+
+@stage
+def copy_rows(rows, first, values, count):
+    """Copies `count` rows of values into the rows from the first on."""
+    for c in range(count):
+        for i in range(LANES):
+            rows[place(first + c, i)] = values[c, i]
+
+
 @cached_by_features
 def make_start(features):
     """Stage that saves the state at which a step begins, and takes it back."""
@@ -39,33 +53,28 @@ def make_start(features):
         for m in range(model.dynamic.shape[0]):
             solid, start = workspace.solid[m], workspace.trial[m].start
             c, P, q, L = solid.position, solid.momentum, solid.orientation, solid.angular_momentum
-            for i in range(LANES):
-                for axis in range(3):
-                    start[POSITION + axis, i] = c[axis, i]
-                    start[MOMENTUM + axis, i] = P[axis, i]
+            copy_rows(start, POSITION, c, 3)
+            copy_rows(start, MOMENTUM, P, 3)
             if rotation != NO_ROTATION:
-                for i in range(LANES):
-                    for axis in range(4):
-                        start[ORIENTATION + axis, i] = q[axis, i]
-                    for axis in range(3):
-                        start[ANGULAR_MOMENTUM + axis, i] = L[axis, i]
+                copy_rows(start, ORIENTATION, q, 4)
+                copy_rows(start, ANGULAR_MOMENTUM, L, 3)
 
     @stage
     def return_to_start(model, workspace, i):
         """Takes lane i back to the start of its step, forces included."""
         for m in range(model.dynamic.shape[0]):
             solid, trial = workspace.solid[m], workspace.trial[m]
-            start, rate = trial.start, trial.rate
+            start, rate = trial.start, trial.rate[0]
             for axis in range(3):
-                solid.position[axis, i] = start[POSITION + axis, i]
-                solid.momentum[axis, i] = start[MOMENTUM + axis, i]
-                solid.force[axis, i] = rate[0, MOMENTUM + axis, i]
+                solid.position[axis, i] = start[place(POSITION + axis, i)]
+                solid.momentum[axis, i] = start[place(MOMENTUM + axis, i)]
+                solid.force[axis, i] = rate[place(MOMENTUM + axis, i)]
             if rotation != NO_ROTATION:
                 for axis in range(4):
-                    solid.orientation[axis, i] = start[ORIENTATION + axis, i]
+                    solid.orientation[axis, i] = start[place(ORIENTATION + axis, i)]
                 for axis in range(3):
-                    solid.angular_momentum[axis, i] = start[ANGULAR_MOMENTUM + axis, i]
-                    solid.torque[axis, i] = rate[0, ANGULAR_MOMENTUM + axis, i]
+                    solid.angular_momentum[axis, i] = start[place(ANGULAR_MOMENTUM + axis, i)]
+                    solid.torque[axis, i] = rate[place(ANGULAR_MOMENTUM + axis, i)]
 
     return save_start, return_to_start
 
@@ -82,35 +91,41 @@ def make_save_rates(features):
             rate, inverse_mass = workspace.trial[m].rate[s], constants.inverse_mass
             P, F, T = solid.momentum, solid.force, solid.torque
             q, L, j = solid.orientation, solid.angular_momentum, constants.inverse_inertia
-            for i in range(LANES):
-                for axis in range(3):
-                    rate[POSITION + axis, i] = at(inverse_mass, i) * P[axis, i]
-                    rate[MOMENTUM + axis, i] = F[axis, i]
+            for axis in range(3):
+                for i in range(LANES):
+                    rate[place(POSITION + axis, i)] = at(inverse_mass, i) * P[axis, i]
+            copy_rows(rate, MOMENTUM, F, 3)
             if rotation != NO_ROTATION:
                 for i in range(LANES):
                     ox, oy, oz = angular_velocity(q, j, i, L[0, i], L[1, i], L[2, i])
                     x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
-                    rate[ORIENTATION, i] = 0.5 * (w * ox + (oy * z - oz * y))
-                    rate[ORIENTATION + 1, i] = 0.5 * (w * oy + (oz * x - ox * z))
-                    rate[ORIENTATION + 2, i] = 0.5 * (w * oz + (ox * y - oy * x))
-                    rate[ORIENTATION + 3, i] = -0.5 * (ox * x + oy * y + oz * z)
-                    for axis in range(3):
-                        rate[ANGULAR_MOMENTUM + axis, i] = T[axis, i]
+                    rate[place(ORIENTATION, i)] = 0.5 * (w * ox + (oy * z - oz * y))
+                    rate[place(ORIENTATION + 1, i)] = 0.5 * (w * oy + (oz * x - ox * z))
+                    rate[place(ORIENTATION + 2, i)] = 0.5 * (w * oz + (ox * y - oy * x))
+                    rate[place(ORIENTATION + 3, i)] = -0.5 * (ox * x + oy * y + oz * z)
+                copy_rows(rate, ANGULAR_MOMENTUM, T, 3)
 
     return save_rates
 
 
 @stage
 def combine(total, rate, coefficients, first, count, rows):
-    """The sum of `count` rates, each times its coefficient, row by row."""
-    for c in range(rows):
-        for i in range(LANES):
-            total[c, i] = 0.0
+    """The sum of `count` rates, each times its coefficient."""
+    for n in range(rows * LANES):
+        total[n] = 0.0
     for s in range(count):
-        factor = coefficients[first + s]
-        for c in range(rows):
-            for i in range(LANES):
-                total[c, i] += factor * rate[s, c, i]
+        factor, values = coefficients[first + s], rate[s]
+        for n in range(rows * LANES):
+            total[n] += factor * values[n]
+
+
+@stage
+def move_rows(values, start, total, first, step):
+    """Sets a vector to its start plus the step times the rates."""
+    for axis in range(3):
+        for i in range(LANES):
+            n = place(first + axis, i)
+            values[axis, i] = start[n] + step[i] * total[n]
 
 
 @cached_by_features
@@ -127,26 +142,21 @@ def make_set_trial(features):
             start, total = trial.start, trial.total
             combine(total, trial.rate, coefficients, (s - 1) * stages, s, rows)
             c, P, q, L = solid.position, solid.momentum, solid.orientation, solid.angular_momentum
-            for i in range(LANES):
-                for axis in range(3):
-                    at_start, mean = start[POSITION + axis, i], total[POSITION + axis, i]
-                    c[axis, i] = at_start + step[i] * mean
-                    at_start, mean = start[MOMENTUM + axis, i], total[MOMENTUM + axis, i]
-                    P[axis, i] = at_start + step[i] * mean
+            move_rows(c, start, total, POSITION, step)
+            move_rows(P, start, total, MOMENTUM, step)
             if rotation != NO_ROTATION:
                 for i in range(LANES):
-                    x = start[ORIENTATION, i] + step[i] * total[ORIENTATION, i]
-                    y = start[ORIENTATION + 1, i] + step[i] * total[ORIENTATION + 1, i]
-                    z = start[ORIENTATION + 2, i] + step[i] * total[ORIENTATION + 2, i]
-                    w = start[ORIENTATION + 3, i] + step[i] * total[ORIENTATION + 3, i]
+                    first = place(ORIENTATION, i)
+                    x = start[first] + step[i] * total[first]
+                    y = start[first + LANES] + step[i] * total[first + LANES]
+                    z = start[first + 2 * LANES] + step[i] * total[first + 2 * LANES]
+                    w = start[first + 3 * LANES] + step[i] * total[first + 3 * LANES]
                     scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
                     q[0, i] = x * scale
                     q[1, i] = y * scale
                     q[2, i] = z * scale
                     q[3, i] = w * scale
-                    for axis in range(3):
-                        at_start = start[ANGULAR_MOMENTUM + axis, i]
-                        L[axis, i] = at_start + step[i] * total[ANGULAR_MOMENTUM + axis, i]
+                move_rows(L, start, total, ANGULAR_MOMENTUM, step)
 
     return set_trial
 
@@ -176,13 +186,19 @@ def make_speed(features):
     @stage
     def speed(model, workspace):
         for m in range(model.dynamic.shape[0]):
-            total, rate = workspace.trial[m].total, workspace.trial[m].rate
-            for c in range(rows):
-                for i in range(LANES):
-                    total[c, i] = rate[0, c, i]
+            total, rate = workspace.trial[m].total, workspace.trial[m].rate[0]
+            for n in range(rows * LANES):
+                total[n] = rate[n]
         largest(model, workspace)
 
     return speed
+
+
+@stage
+def square_of(rows, first, i):
+    """The square of the vector whose rows are the first and the next two."""
+    x, y, z = rows[place(first, i)], rows[place(first + 1, i)], rows[place(first + 2, i)]
+    return x * x + y * y + z * z
 
 
 @cached_by_features
@@ -204,19 +220,15 @@ def make_largest(features):
             constants, total = model.dynamic[m], workspace.trial[m].total
             q, j = workspace.solid[m].orientation, constants.inverse_inertia
             for i in range(LANES):
-                cx, cy, cz = total[POSITION, i], total[POSITION + 1, i], total[POSITION + 2, i]
-                px, py, pz = total[MOMENTUM, i], total[MOMENTUM + 1, i], total[MOMENTUM + 2, i]
-                inverse_mass = at(constants.inverse_mass, i)
-                moved = cx * cx + cy * cy + cz * cz
-                faster = inverse_mass * inverse_mass * (px * px + py * py + pz * pz)
+                moved, pushed = square_of(total, POSITION, i), square_of(total, MOMENTUM, i)
+                faster = at(constants.inverse_mass, i) * at(constants.inverse_mass, i) * pushed
                 turned, spun = 0.0, 0.0
                 if rotation != NO_ROTATION:
-                    x, y = total[ORIENTATION, i], total[ORIENTATION + 1, i]
-                    z, w = total[ORIENTATION + 2, i], total[ORIENTATION + 3, i]
-                    turned = 4.0 * (x * x + y * y + z * z + w * w)
-                    lx = total[ANGULAR_MOMENTUM, i]
-                    ly = total[ANGULAR_MOMENTUM + 1, i]
-                    lz = total[ANGULAR_MOMENTUM + 2, i]
+                    w = total[place(ORIENTATION + 3, i)]
+                    turned = 4.0 * (square_of(total, ORIENTATION, i) + w * w)
+                    lx = total[place(ANGULAR_MOMENTUM, i)]
+                    ly = total[place(ANGULAR_MOMENTUM + 1, i)]
+                    lz = total[place(ANGULAR_MOMENTUM + 2, i)]
                     ox, oy, oz = angular_velocity(q, j, i, lx, ly, lz)
                     spun = ox * ox + oy * oy + oz * oz
                 value = math.sqrt(max(max(moved, faster), max(turned, spun)))

@@ -144,12 +144,13 @@ LANE = np.dtype(
 POSITION, MOMENTUM, ORIENTATION, ANGULAR_MOMENTUM, STATE_ROWS = 0, 3, 6, 10, 13
 MOST_STAGES = 7  # of a Runge-Kutta method
 
-# one row per body, of Runge-Kutta methods
+# one row per body, of Runge-Kutta methods. The rows of a state stand one after the other, because
+# the longer a loop is, the less LLVM's checks before it cost; see `runge_kutta.place`
 TRIAL = np.dtype(
     [
-        ("start", "f8", (STATE_ROWS, LANES)),  # state at the start of the step
-        ("rate", "f8", (MOST_STAGES, STATE_ROWS, LANES)),  # its rates at each stage
-        ("total", "f8", (STATE_ROWS, LANES)),  # sum of the rates, each times its coefficient
+        ("start", "f8", (STATE_ROWS * LANES,)),  # state at the start of the step
+        ("rate", "f8", (MOST_STAGES, STATE_ROWS * LANES)),  # its rates at each stage
+        ("total", "f8", (STATE_ROWS * LANES,)),  # sum of the rates, each times its coefficient
     ],
     align=True,
 )

@@ -2,39 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy.special import ellipj
 
 from physics import Fidelity, World
 from physics.reference import closed_forms, scenes
-from physics.rotation import rotate, rotate_back
+from physics.rotation import rotate
+from tests.physics.integrators.top import jacobi_spin, spin_in_body
 
 MILLISECOND = Fidelity(substep=1e-3)
-
-
-def jacobi_spin(moments, spin, times):
-    """Body-frame spin [n, 3] of a torque-free body with rising moments, at first in its x-z plane.
-
-    Landau and Lifshitz, Mechanics, section 37, for L^2 > 2 E J_y: the spin circles the z axis.
-    """
-    a, b, c = moments
-    energy = np.sum(moments * spin**2)  # twice the kinetic energy
-    square = np.sum((moments * spin) ** 2)
-    assert square > energy * b
-    rate = np.sqrt((c - b) * (square - energy * a) / (a * b * c))
-    parameter = (b - a) * (energy * c - square) / ((c - b) * (square - energy * a))
-    sn, cn, dn, _ = ellipj(times * rate, parameter)
-    return np.stack(
-        [
-            np.sqrt((energy * c - square) / (a * (c - a))) * cn,
-            np.sqrt((energy * c - square) / (b * (c - b))) * sn,
-            np.sqrt((square - energy * a) / (c * (c - a))) * dn,
-        ],
-        axis=-1,
-    )
-
-
-def spin_in_body(world):
-    return rotate_back(world.orientation, world.angular_velocity)[0, 0]
 
 
 def moments_of(scene):
