@@ -1,6 +1,7 @@
 """A torque-free top, its exact spin and orientation, and worlds whose integrator is tested.
 
-All of these worlds have a field, if only a drag of zero, so that there is one kernel per integrator.
+All of these worlds have a field, if only a drag of zero, and can have wrenches; those of the adaptive
+pair can differ in parameters. So there is one kernel per integrator.
 """
 
 import math
@@ -21,11 +22,13 @@ SPIN = np.array(TOP.angular_velocity)
 def world_of(body, integrator, substep, field=None, count=1, tolerance=None, threads=1):
     """One body without gravity; `tolerance` is for "adaptive" alone."""
     scene = Scene([body], gravity=(0.0, 0.0, 0.0), fields=[Drag() if field is None else field])
-    if integrator != "adaptive":
-        tolerance = None
-    return World(
-        scene, Fidelity(substep=substep, integrator=integrator, tolerance=tolerance), count, threads
+    adaptive = integrator == "adaptive"
+    fidelity = Fidelity(
+        substep=substep, integrator=integrator, tolerance=tolerance if adaptive else None
     )
+    world = World(scene, fidelity, count, threads, per_world_parameters=adaptive)
+    world.apply_wrench()
+    return world
 
 
 def jacobi_spin(moments, spin, times):
