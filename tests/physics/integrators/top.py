@@ -1,7 +1,7 @@
 """A torque-free top, its exact spin and orientation, and worlds whose integrator is tested.
 
-All of these worlds have a field, if only a drag of zero, and can have wrenches; those of the adaptive
-pair can differ in parameters. So there is one kernel per integrator.
+All of these worlds have a field, if only a drag of zero, and can have wrenches; those of the
+adaptive pair can differ in parameters. So there is one kernel per integrator.
 """
 
 import math
