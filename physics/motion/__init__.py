@@ -1,1 +1,1 @@
-"""How bodies move: integrator, kinematics, gravity and drives."""
+"""How bodies move: kinematics, gravity and drives."""
