@@ -9,11 +9,19 @@ def check_integrator(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     """Raises an error if the forces of a scene don't follow from its state alone.
 
     Runge-Kutta methods evaluate forces several times a step, at trial states. Contacts and the set
-    points of servos remember the step before, so there their forces are undefined.
+    points of servos remember the step before, so there their forces are undefined. Joints hold by
+    impulses that belong to the midpoint integrator's step.
 
     Raises:
-        ValueError: such an integrator with solids that can touch or with drives.
+        ValueError: another integrator than midpoint with joints; a Runge-Kutta method with solids
+            that can touch or with drives.
     """
+    if scene.joints and fidelity.integrator != "midpoint":
+        raise ValueError(
+            f"Fidelity.integrator {fidelity.integrator!r} can't hold joints, which act in the "
+            f"middle and at the end of a step; the scene has {len(scene.joints)}: use "
+            'integrator="midpoint"'
+        )
     if fidelity.integrator not in ("rk4", "adaptive"):
         return
     problem = f"Fidelity.integrator {fidelity.integrator!r} evaluates forces at trial states, "

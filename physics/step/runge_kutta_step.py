@@ -26,7 +26,7 @@ def make_trials(features: Features):
                 set_trial(model, workspace, s)
             kinematics(model, workspace)
             # velocities are those of the trial state; nothing here depends on the step
-            forces(model, state, workspace, g, 0.0, 0.0, elapsed)
+            forces(model, state, workspace, g, 0.0, 0.0, 0.0, elapsed)
             if not refresh and s < stages:
                 save_rates(model, workspace, s)
         if refresh:

@@ -4,7 +4,19 @@ import math
 
 import pytest
 
-from physics import BallJoint, Body, Box, Distance, Hinge, Motor, Scene, Slider, Weld, World
+from physics import (
+    BallJoint,
+    Body,
+    Box,
+    Distance,
+    Fidelity,
+    Hinge,
+    Motor,
+    Scene,
+    Slider,
+    Weld,
+    World,
+)
 
 CUBE = Box((0.05, 0.05, 0.05))
 ORIGIN = (0.0, 0.0, 0.0)
@@ -75,3 +87,10 @@ def test_poses_that_violate_a_joint_are_refused_and_change_nothing():
     assert world.joint_position()[2, 0] == pytest.approx(0.5 * math.pi)
     with pytest.raises(ValueError, match="velocity needs a Hinge or Slider with a Motor"):
         world.command_motors(1.0)
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4", "adaptive"])
+def test_other_integrators_refuse_joints(integrator):
+    scene = Scene([Body(CUBE, mask=0)], joints=[BallJoint(0, None, ORIGIN)])
+    with pytest.raises(ValueError, match=r"can't hold joints.*use integrator=\"midpoint\""):
+        World(scene, Fidelity(integrator=integrator))
