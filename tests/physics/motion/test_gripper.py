@@ -149,7 +149,7 @@ def test_a_gripper_counts_as_two_tools_between_others():
     np.testing.assert_allclose(made.driven_bodies[1].position, (1, 1.95, 3))
     np.testing.assert_allclose(made.driven_bodies[2].position, (1, 2.05, 3))
     assert made.driven_bodies[1].force_limit == 1.0
-    with pytest.raises(ValueError, match="a gripper's fingers, and solids"):
+    with pytest.raises(ValueError, match="a gripper's fingers, bodies that a joint"):
         World(made).normal_force(1, 2)
 
 
