@@ -9,6 +9,7 @@ from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.fields import Attractor, Drag, PointSpring
 from physics.scene.joints import BallJoint, Distance, Hinge, Motor, Slider, Weld
 from physics.scene.material import Material
+from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
 from physics.scene.part import Part
 from physics.scene.scene import Scene
@@ -36,6 +37,7 @@ __all__ = [
     "Ground",
     "Hinge",
     "Material",
+    "Mesh",
     "Motor",
     "Parameters",
     "Part",

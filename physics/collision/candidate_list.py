@@ -9,13 +9,14 @@ import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.collision.distances import core_distance
+from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.scene.shapes import PARTICLES, PLANE
+from physics.scene.shapes import GRID, PARTICLES, PLANE
 
 
 @cached_by_features
@@ -70,6 +71,7 @@ def make_list_samples(features):
     impulse, particles = features.impulse, features.particles
     per_world_parameters = features.per_world_parameters
     add_candidate = make_add_candidate(features)
+    grid = features.grid
     separations = make_separations(features)
     distance = by_surface_kind(
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
@@ -151,6 +153,9 @@ def make_list_samples(features):
                     _, nx, ny, nz = distance(
                         half_pair.kind, x, y, z, ca, cb, cc, radius, face_normals
                     )
+                    if grid and half_pair.kind == GRID:
+                        size = at(half_pair.surface_size, i)
+                        _, nx, ny, nz = grid_distance(model, half_pair.grid, size, x, y, z)
                     add_manifold_point(
                         workspace.manifold[first_point + n],
                         workspace.solid[half_pair.frame],

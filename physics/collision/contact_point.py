@@ -13,7 +13,7 @@ from physics.collision.distances import box_distance, capsule_distance, sphere_d
 from physics.compiler.jit import stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE
+from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE
 
 # m: samples that come within this distance count as touching, so that a face that arrives just then
 # does not touch with some of its corners only, chosen by round-off
@@ -26,6 +26,7 @@ HIDDEN = 9.0
 def make_touch(features, kind):
     """Formula for samples against one kind of surface."""
     plane, particles, box = kind == PLANE, kind == PARTICLES, kind == BOX
+    grid = kind == GRID
     compound, remembered_face = features.compound, contact_memory(features).face
     surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
 
@@ -75,6 +76,13 @@ def make_touch(features, kind):
             face = row.memory[remembered_face, i]
             distance, nx, ny, nz, face = box_distance(
                 px, py, pz, ca, cb, cc, face, radius, face_normals
+            )
+        elif grid:  # `grid_distances` has looked it up
+            distance, nx, ny, nz = (
+                row.distance[i],
+                row.normal[0, i],
+                row.normal[1, i],
+                row.normal[2, i],
             )
         else:
             distance, nx, ny, nz = surface_distance(px, py, pz, ca, cb, cc)

@@ -1,10 +1,11 @@
 """Separations between the samples of a half-pair and its surface, in one lane, for a search."""
 
 from physics.collision.distances import core_distance
+from physics.collision.grid_distance import grid_separations
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import at, stage
 from physics.model.features import cached_by_features
-from physics.scene.shapes import PARTICLES, PLANE
+from physics.scene.shapes import GRID, PARTICLES, PLANE
 
 
 @stage
@@ -37,6 +38,8 @@ def make_separations(features):
         """A loop without branches over columns of samples, for vector instructions."""
         if kind == PARTICLES:  # pairs of particles are searched one by one
             return None
+        if kind == GRID:
+            return grid_separations
         distance = core_distance(kind)
 
         @stage

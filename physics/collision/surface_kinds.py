@@ -8,7 +8,7 @@ import inspect
 from typing import Any
 
 from physics.compiler.jit import sequence, stage
-from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE
+from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE, SPHERE
 
 
 def present_kinds(features):
@@ -19,6 +19,7 @@ def present_kinds(features):
         SPHERE: features.sphere,
         CAPSULE: features.capsule,
         PARTICLES: features.particles,
+        GRID: features.grid,
     }
     return [kind for kind, present in kinds.items() if present]
 

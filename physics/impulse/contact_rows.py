@@ -6,6 +6,7 @@ the velocities at the others. (The spring law needs a contact point only once.)
 
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
+from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_pose
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, stage
@@ -13,7 +14,7 @@ from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated
-from physics.scene.shapes import BOX, PLANE
+from physics.scene.shapes import BOX, GRID, PLANE
 
 
 @cached_by_features
@@ -147,6 +148,7 @@ def make_contact_rows(features):
 def make_contact_rows_of_kind(features, kind):
     """The same, for half-pairs whose surface is of one kind."""
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    grid = kind == GRID
     prepare = make_prepare(features, kind)
 
     @stage
@@ -166,6 +168,8 @@ def make_contact_rows_of_kind(features, kind):
             relative_pose(owner, frame, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
+        if grid:
+            grid_distances(model, k, candidate, relative)
         prepare(
             slots,
             candidate,

@@ -13,6 +13,7 @@ from physics.model.coefficients import (
 )
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.model.fields import field_rows
+from physics.model.grids import grid_rows
 from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.tables import (
@@ -30,7 +31,7 @@ from physics.scene.fields import PointSpring
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
-from physics.scene.shapes import BOX, CAPSULE, PARTICLES, PLANE, SPHERE, Samples, Sphere
+from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE, SPHERE, Samples, Sphere
 from physics.scene.solids import Body, Ground
 from physics.scene.validation import IDENTITY
 
@@ -60,6 +61,7 @@ def build(
     layout, own = Layout.of(scene, fidelity), Parameters.of(scene)
     dynamic = _dynamic_rows(scene)
     half_pairs, samples = _half_pair_rows(layout)
+    half_pairs["grid"], grids, nodes = grid_rows(layout)
     parts, hidden = _compound_part_rows(layout)
     for rows, columns in (
         (dynamic, dynamic_columns(layout, own)),
@@ -75,7 +77,8 @@ def build(
     static = np.array(poses, dtype=float).reshape(-1, 7)
     world = len(dynamic) + len(static) + len(parts)  # row of Workspace.solid
     joints = joint_rows(scene, world)
-    model = Model(dynamic, half_pairs, parts, hidden, static, samples, field_rows(scene), joints)
+    tables = (dynamic, half_pairs, parts, hidden, static, samples)
+    model = Model(*tables, field_rows(scene), joints, grids, nodes)
     return model, _features(scene, fidelity, model, per_world_parameters)
 
 
@@ -235,6 +238,7 @@ def _features(
         box=BOX in kinds,
         capsule=CAPSULE in kinds,
         particles=PARTICLES in kinds,
+        grid=GRID in kinds,
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
         fields=bool(scene.fields),

@@ -29,6 +29,7 @@ class Features(NamedTuple):
         resistance: at least one pair has rolling or spinning resistance.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
+        grid: likewise, the distance grid of a mesh.
         drives: the scene has drives.
         gripper: at least two of the drives are the fingers of a gripper.
         fields: the scene has fields: springs to points, attractors, drag.
@@ -52,6 +53,7 @@ class Features(NamedTuple):
     box: bool
     capsule: bool
     particles: bool
+    grid: bool
     drives: bool
     gripper: bool
     fields: bool

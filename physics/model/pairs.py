@@ -15,6 +15,7 @@ from physics.scene.compound import Compound, SampleSet
 from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.material import Material
+from physics.scene.mesh import Mesh
 from physics.scene.part import Part
 from physics.scene.scene import Scene
 from physics.scene.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
@@ -151,7 +152,7 @@ def _half_pairs(
         shape, distance = solid.shape, spacing(solid.shape, scene, fidelity)
         if isinstance(shape, Compound):
             return shape.sample_sets(distance, rounding(solid))
-        return (SampleSet(shape.samples(distance, rounding(solid)), isinstance(shape, Box)),)
+        return (SampleSet(shape.samples(distance, rounding(solid)), isinstance(shape, Box | Mesh)),)
 
     def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""

@@ -7,6 +7,7 @@ rod or plate rocks faster than it bobs, which limits the stiffness that a time s
 import numpy as np
 
 from physics.scene.compound import Compound
+from physics.scene.mesh import Mesh
 from physics.scene.shapes import Box, Shape
 
 Array = np.ndarray
@@ -28,12 +29,13 @@ def largest_eigenvalue(inverse_mass: Array, A: Array) -> float:
 def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
     """Unit stiffness along and across the normal, [6, 6] each, for each of the six sides.
 
-    The samples that touch share the stiffness by their weights.
+    A mesh has its flat sides besides. The samples that touch share the stiffness by their weights.
     """
     positions, weights, radius = shape.samples(spacing, 0.0)
     radii = np.broadcast_to(radius, len(weights))
     found = []
-    for normal in (*np.eye(3), *-np.eye(3)):
+    others = shape.sides() if isinstance(shape, Mesh) else ()
+    for normal in (*np.eye(3), *-np.eye(3), *others):
         height = positions @ normal - radii
         lowest = height <= height.min() + 1e-9
         along, across = np.zeros((6, 6)), np.zeros((6, 6))
@@ -60,10 +62,12 @@ def rocking_leverage(shape: Shape) -> float:
     """Stiffness times the squared height over the face, divided by the stiffness against rocking.
 
     For a box on its widest face, which is where a body that slides comes to rest; a compound is
-    taken on the side with the least leverage; balls and capsules don't rock.
+    or mesh is taken on the side with the least leverage; balls and capsules don't rock.
     """
     if isinstance(shape, Compound):
         return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0))
+    if isinstance(shape, Mesh):
+        return _leverage_of_mesh(shape)
     if not isinstance(shape, Box):
         return 0.0
     height, *sides = sorted(shape.half_extents)
@@ -84,4 +88,21 @@ def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> floa
             spread = fraction @ (places - fraction @ places) ** 2
             if np.all(spread > least):
                 found.append(float(height.max() ** 2 * np.mean(1.0 / spread)))
+    return min(found, default=0.0)
+
+
+def _leverage_of_mesh(mesh: Mesh) -> float:
+    """The least leverage of the flat sides of a mesh; 0 without any: it rolls."""
+    positions, weights, _ = mesh.samples(0.5 * mesh.width, 0.0)
+    found, least = [], (1e-6 * np.abs(positions).max()) ** 2
+    for normal in mesh.sides():
+        height = positions @ normal
+        lowest = height >= height.max() - 1e-6 * height.max()
+        fraction = weights[lowest] / weights[lowest].sum()
+        across = np.linalg.svd(normal[None])[2][1:]
+        places = positions[lowest] @ across.T
+        places = places - fraction @ places
+        spread = np.linalg.eigvalsh(np.einsum("k,ki,kj->ij", fraction, places, places))
+        if np.all(spread > least):
+            found.append(float(height.max() ** 2 * np.mean(1.0 / spread)))
     return min(found, default=0.0)

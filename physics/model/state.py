@@ -90,6 +90,10 @@ def candidate_dtype(features: Features) -> np.dtype:
         fields.append(("hidden_offset", "f8", (3, LANES)))
     if features.particles:
         fields.append(("partner", "f8", (3, LANES)))  # m, particle of the surface
+    if features.grid:
+        # m, distance from a mesh, and the normal there, see `grid_distance`
+        fields.append(("distance", "f8", (LANES,)))
+        fields.append(("normal", "f8", (3, LANES)))
     return np.dtype(fields, align=True)
 
 

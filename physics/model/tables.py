@@ -53,6 +53,7 @@ HALF_PAIR = np.dtype(
         ("partner_count", "i8"),
         ("first_slot", "i8"),  # into State.candidate
         ("slot_count", "i8"),
+        ("grid", "i8"),  # row of Model.grid that is the surface, or -1
         ("face_normals", "i8"),  # 1: samples of a box, which faces push out, see `box_distance`
         # of a body on a ground or static: gravity of the owner less that of the surface, m/s^2, in
         # the world frame; and the slope above which it slides, over mu: more than 1 if it can roll
@@ -141,6 +142,19 @@ HIDDEN_FACE = np.dtype(
     align=True,
 )
 
+# one row per distance grid of a mesh, in the mesh's frame at size 1
+GRID_TABLE = np.dtype(
+    [
+        ("first", "i8"),  # into Model.grid_value
+        ("count", "i8", (3,)),  # nodes along each axis
+        ("origin", "f8", (3,)),  # m, of the first node
+        ("cell", "f8"),  # m
+        ("low", "f8", (3,)),  # m, corners of the mesh's bounding box
+        ("high", "f8", (3,)),
+    ],
+    align=True,
+)
+
 # one row per field and, of a Drag on all bodies, per body
 POINT_SPRING, ATTRACTOR, DRAG = range(3)
 FIELD = np.dtype(
@@ -202,6 +216,8 @@ class Model(NamedTuple):
         sample: [4, p] x y z in m in the owner's frame at size 1, and weight.
         field: [f] of FIELD.
         joint_row: [r] of JOINT_ROW.
+        grid: [g] of GRID_TABLE.
+        grid_value: [n] m, signed distances at the nodes of all grids, at size 1.
     """
 
     dynamic: Array
@@ -212,6 +228,8 @@ class Model(NamedTuple):
     sample: Array
     field: Array
     joint_row: Array
+    grid: Array
+    grid_value: Array
 
     @property
     def nbytes(self) -> int:

@@ -17,6 +17,7 @@ from physics.scene.drives import Drive, Gripper
 from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
 from physics.scene.joints import BallJoint, Distance, Hinge, Joint, Motor, Slider, Weld
 from physics.scene.material import Material
+from physics.scene.mesh import Mesh
 from physics.scene.part import Part
 from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
@@ -25,7 +26,8 @@ from physics.scene.validation import ZERO, Vector, instance, vector
 # classes of all objects that a scene is made of
 _PARTS = (
     Body, Ground, Static, Drive, Gripper, Material, PointSpring, Attractor, Drag,
-    Sphere, Box, Capsule, Compound, Part, BallJoint, Hinge, Slider, Weld, Distance, Motor,
+    Sphere, Box, Capsule, Compound, Part, Mesh,
+    BallJoint, Hinge, Slider, Weld, Distance, Motor,
 )  # fmt: skip
 
 

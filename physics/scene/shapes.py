@@ -29,6 +29,8 @@ Array = np.ndarray
 
 # kinds of surface that samples are tested against
 PLANE, SPHERE, BOX, CAPSULE, PARTICLES = range(5)
+# a signed distance on a grid
+GRID = 7
 
 
 class Samples(NamedTuple):
@@ -49,15 +51,17 @@ class Surface(NamedTuple):
     """A surface that samples are tested against.
 
     Attributes:
-        kind: PLANE, SPHERE, BOX, CAPSULE or PARTICLES.
+        kind: PLANE, SPHERE, BOX, CAPSULE, PARTICLES or GRID.
         parameters: m, of the core: the half extents of a box; 0, 0 and the half length of a
-            capsule; the height of a plane, 0 and 0; zeros for the other kinds.
+            capsule; the height of a plane, 0 and 0; of a grid, a box around the mesh; else zeros.
         radius: m, rounding radius around the core.
+        mesh: of a GRID, the Mesh.
     """
 
     kind: int
     parameters: tuple[float, float, float]
     radius: float
+    mesh: Any = None
 
 
 @runtime_checkable

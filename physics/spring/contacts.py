@@ -7,13 +7,14 @@ conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in 
 import math
 
 from physics.collision.compound_frames import mark_hidden_faces
+from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_gravity, relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
 from physics.model.lanes import record_contacts
 from physics.motion.vectors import rotated
-from physics.scene.shapes import BOX, PLANE
+from physics.scene.shapes import BOX, GRID, PLANE
 from physics.spring.contact_loop import make_contact_loop
 from physics.spring.energy_correction import make_energy_correction
 
@@ -40,7 +41,7 @@ def make_half_pair(features, report):
 def make_half_pair_of_kind(features, kind, report):
     """The same, for half-pairs whose surface is of one kind."""
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
-    slope = features.slope
+    slope, grid = features.slope, kind == GRID
     begin_half_pair = make_begin_half_pair(features)
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
@@ -65,6 +66,8 @@ def make_half_pair_of_kind(features, kind, report):
                 relative_gravity(frame, constants.gravity, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
+        if grid:
+            grid_distances(model, k, candidate, relative)
         # The normal on a ball or capsule (`face_normals` 0) can leap from face to face of a box
         # within a step and add energy, which this removes. Before the loop, which overwrites the
         # face that each candidate remembers. Not in a refresh, where h = 0

@@ -1,0 +1,1 @@
+"""Algorithms on triangle meshes: mass properties, checks, depth peeling, distances, samples."""
