@@ -4,6 +4,8 @@ Sequential impulses need more sweeps, and make towers sway, the more points shar
 candidates of a pair that would touch on the same face, from both half-pairs, only four stay: those
 that span the largest patch. They carry the weight of all. They are chosen when lists are replaced;
 until then another sample can get as deep as the skin is wide, if a body rotates about the four.
+A mesh keeps all its candidates: its round sides have many samples nearly in a plane, and on four
+that span it, but are not the deepest, it would rock without end.
 """
 
 import math
@@ -139,7 +141,7 @@ def reduce_face(manifold, n, face, skin):
 @cached_by_features
 def make_manifold_reduction(features, clear):
     """Stage that reduces the lists, just made, of a half-pair and its reverse in one lane."""
-    memory_size = contact_memory(features).size
+    memory_size, mesh = contact_memory(features).size, features.mesh
 
     @stage
     def move(candidate, ids, i, source, target):
@@ -172,6 +174,8 @@ def make_manifold_reduction(features, clear):
     def reduce_manifold(model, state, workspace, g, k, i):
         half_pair = model.half_pair[k]
         if half_pair.kind == PARTICLES:
+            return
+        if mesh and half_pair.keeps_all != 0:
             return
         reverse, manifold = half_pair.reverse, workspace.manifold
         count = workspace.half_pair[k].count[i]

@@ -29,6 +29,7 @@ from physics.model.tables import (
 from physics.scene.fidelity import INTEGRATORS, Fidelity
 from physics.scene.fields import PointSpring
 from physics.scene.internal_faces import HiddenFace, hidden_faces
+from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE, SPHERE, Samples, Sphere
@@ -173,16 +174,17 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         row["first_slot"], row["slot_count"] = slots, half_pair.capacity
         slots += half_pair.capacity
         row["face_normals"] = half_pair.face_normals
+        ends = (layout.solids[owner], layout.solids[surface])
+        row["keeps_all"] = any(isinstance(getattr(s, "shape", None), Mesh) for s in ends)
         row["slide_slope"] = 1.0
         for sign, body, other in ((1.0, owner, surface), (-1.0, surface, owner)):
             if body < layout.bodies and other >= layout.dynamic_count:
                 row["gravity"] = sign * layout.gravity
                 if layout.leverage[body] == 0.0:  # it rolls
                     row["slide_slope"] = layout.modes[body, 1]
-        solids = layout.solids[owner], layout.solids[surface]
-        if any(isinstance(solid, Body) for solid in solids):  # nothing else rotates
+        if any(isinstance(solid, Body) for solid in ends):  # nothing else rotates
             for name in ("rolling", "spinning"):
-                resistances = [getattr(solid.material, f"{name}_resistance") for solid in solids]
+                resistances = [getattr(solid.material, f"{name}_resistance") for solid in ends]
                 row[name] = max(resistances)
     return rows, np.ascontiguousarray(np.concatenate(blocks).T)
 
@@ -239,6 +241,7 @@ def _features(
         capsule=CAPSULE in kinds,
         particles=PARTICLES in kinds,
         grid=GRID in kinds,
+        mesh=bool(np.any(model.half_pair["keeps_all"])),
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
         fields=bool(scene.fields),

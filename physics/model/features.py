@@ -30,6 +30,7 @@ class Features(NamedTuple):
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
         plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
         grid: likewise, the distance grid of a mesh.
+        mesh: at least one solid is a mesh.
         drives: the scene has drives.
         gripper: at least two of the drives are the fingers of a gripper.
         fields: the scene has fields: springs to points, attractors, drag.
@@ -54,6 +55,7 @@ class Features(NamedTuple):
     capsule: bool
     particles: bool
     grid: bool
+    mesh: bool
     drives: bool
     gripper: bool
     fields: bool

@@ -146,13 +146,15 @@ def _half_pairs(
     def particles(solid: Body | Drive | Static) -> Samples:
         return solid.shape.particles(spacing(solid.shape, scene, fidelity))
 
-    def sample_sets(solid: Body | Drive | Static) -> tuple[SampleSet, ...]:
+    def sample_sets(solid: Body | Drive | Static, least: float = 0.0) -> tuple[SampleSet, ...]:
+        """Samples that are inset by the rounding, and by at least `least` m if they can be."""
         if fidelity.geometry == "particle" and isinstance(solid, Body):
             return (SampleSet(particles(solid), False),)
         shape, distance = solid.shape, spacing(solid.shape, scene, fidelity)
+        inset = max(rounding(solid), min(least, 0.25 * shape.width))
         if isinstance(shape, Compound):
-            return shape.sample_sets(distance, rounding(solid))
-        return (SampleSet(shape.samples(distance, rounding(solid)), isinstance(shape, Box | Mesh)),)
+            return shape.sample_sets(distance, inset)
+        return (SampleSet(shape.samples(distance, inset), isinstance(shape, Box | Mesh)),)
 
     def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""
@@ -166,9 +168,10 @@ def _half_pairs(
         ]
         if not surfaces:
             surfaces = [(-1, b.shape.surface(rounding(b)))]
+        least = b.shape.edge_radius if isinstance(b.shape, Mesh) else 0.0
         return [
             HalfPair(owner, other, samples, surface, None, part=k, face_normals=face_normals)
-            for samples, face_normals in sample_sets(a)
+            for samples, face_normals in sample_sets(a, least)
             for k, surface in surfaces
         ]
 

@@ -28,7 +28,7 @@ from physics.scene.validation import (
 
 Array = np.ndarray
 
-# cells by which samples are inset: half a cell's diagonal more than the cell of an edge
+# cells from an edge within which normals are mixed: its own cell, and half a cell for the sink
 _CELLS_INSET = 1.5
 
 
@@ -156,6 +156,16 @@ class Mesh:
         return self.scale * self._solid.thickness
 
     @property
+    def edge_radius(self) -> float:
+        """Distance in m from an edge within which the distance grid mixes its faces' normals.
+
+        Samples that touch the mesh are inset by at least as much, so that on a face whose edges
+        are in line with their own they have its normal.
+        """
+        longest = self.scale * float(np.ptp(self._solid.vertices, axis=0).max())
+        return _CELLS_INSET * longest / self.cells
+
+    @property
     def reach(self) -> float:
         """Largest distance of a vertex from the centre, in m."""
         return self.scale * float(np.linalg.norm(self._solid.vertices, axis=1).max())
@@ -171,12 +181,10 @@ class Mesh:
     def samples(self, spacing: float, rounding: float) -> Samples:
         """Samples at corners, edges and round areas, see `physics.meshes.samples`.
 
-        They are inset by more than `rounding` if the cells of the distance grid are large: within a
-        cell of an edge the normals of its two faces are mixed.
+        They are inset by at least `edge_radius`, or half of the walls, unless `rounding` is zero.
         """
         if rounding > 0.0:
-            cell = self.scale * float(np.ptp(self._solid.vertices, axis=0).max()) / self.cells
-            rounding = min(max(rounding, _CELLS_INSET * cell), 0.5 * self.thickness)
+            rounding = min(max(rounding, self.edge_radius), 0.5 * self.thickness)
         positions, shares = geometry.samples(
             self.vertices, self.faces, spacing / self.scale, rounding / self.scale
         )
