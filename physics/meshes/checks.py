@@ -70,7 +70,7 @@ def check_solid_mesh(vertices: Array, faces: Array) -> None:
         )
 
 
-def warn_if_thin(thickness: float, cell: float, cells: int, what: str) -> None:
+def warn_if_thin(thickness: float, cell: float, cells: float, what: str) -> None:
     """Warns if walls are thinner than a cell: they would have holes, or be missing.
 
     Args:

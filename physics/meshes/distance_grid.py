@@ -21,6 +21,8 @@ Array = np.ndarray
 MARGIN = 4
 # cells around a triangle's bounding box within which its distance is computed directly
 _BAND = 1
+# blocks of cells along the longest side that have a surface point each
+_BLOCKS = 12
 
 
 class DistanceGrid(NamedTuple):
@@ -32,6 +34,7 @@ class DistanceGrid(NamedTuple):
         cell: m.
         low: [3] m, lower corner of the mesh's bounding box.
         high: [3] m, upper corner.
+        points: [k, 3] m, nodes at the surface spread over all of it: guesses of the nearest point.
     """
 
     values: Array
@@ -39,6 +42,7 @@ class DistanceGrid(NamedTuple):
     cell: float
     low: Array
     high: Array
+    points: Array
 
 
 @stage
@@ -148,6 +152,18 @@ def distance_grid(vertices: Array, faces: Array, cells: int) -> DistanceGrid:
     rays = int(counts[0] * counts[1])
     inside = fill(peel(vertices, faces, grid), rays, origin[2], cell, int(counts[2]))
     values = np.sqrt(square)
-    return DistanceGrid(
-        np.where(inside.reshape(values.shape), -values, values), origin, cell, low, high
-    )
+    points = origin + cell * _surface_nodes(values / cell, max(1, cells // _BLOCKS))
+    signed = np.where(inside.reshape(values.shape), -values, values)
+    return DistanceGrid(signed, origin, cell, low, high, points)
+
+
+def _surface_nodes(away: Array, block: int) -> Array:
+    """Indices [k, 3] of the node nearest to the surface in each block of nodes that it crosses.
+
+    Args:
+        away: [nx, ny, nz] distance from the surface in cells.
+        block: nodes along a side of a block.
+    """
+    nodes = np.argwhere(away <= 0.5 * math.sqrt(3.0))
+    nodes = nodes[np.argsort(away[tuple(nodes.T)], kind="stable")]
+    return np.asarray(nodes[np.unique(nodes // block, axis=0, return_index=True)[1]])

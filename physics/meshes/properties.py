@@ -59,7 +59,8 @@ def principal_axes(tensor: Array) -> tuple[Array, Array]:
     """
     moments, axes = np.linalg.eigh(tensor)
     same = _SAME * moments.sum()
-    best, order_of_best, largest = np.eye(3), (0, 1, 2), -np.inf
+    best, largest = np.eye(3), -np.inf
+    order_of_best: tuple[int, ...] = (0, 1, 2)
     for order in permutations(range(3)):  # order[k]: the moment about axis k
         rotation = np.empty((3, 3))
         for k in range(3):

@@ -27,8 +27,8 @@ _FLAT = 1.0 - 1e-8
 _LONGEST = 3.0
 # points along a triangle's side per spacing, from which round areas choose their samples
 _FINER = 2.0
-# decimals of a position over the spacing by which points on the two sides of an edge are one
-_DECIMALS = 6
+# of a length, below which a difference is round-off
+_SAME = 1e-6
 
 
 class _Edges:
@@ -141,10 +141,11 @@ def _curves(vertices: Array, edges: _Edges) -> tuple[list[list[tuple[int, int]]]
     curves = []
     # curves between corners first; what is left are loops without a corner
     for start in [*sorted(corner), *sorted(at)]:
-        for _, first in at[start]:
+        for _, first in list(at[start]):
             if used[first]:
                 continue
-            curve, v, e = [], start, first
+            curve: list[tuple[int, int]] = []
+            v, e = int(start), int(first)
             while e >= 0:
                 used[e] += 1
                 curve.append((v, e))
@@ -171,7 +172,7 @@ def _along(
         place = reached[-1] * k / count
         n = min(int(np.searchsorted(reached, place, side="right")) - 1, len(lengths) - 1)
         t = (place - reached[n]) / lengths[n]
-        vertex = curve[n][0] if t < 1e-6 else (curve[n + 1][0] if t > 1.0 - 1e-6 else -1)
+        vertex = curve[n][0] if t < _SAME else (curve[n + 1][0] if t > 1.0 - _SAME else -1)
         found.append((places[n] + t * (places[n + 1] - places[n]), vertex, curve[n][1]))
     return found
 

@@ -27,10 +27,12 @@ def grid_rows(layout: Layout) -> tuple[Array, Array, Array]:
         if mesh not in known:
             known[mesh], grid = len(rows), mesh.grid
             row: Any = np.zeros(1, dtype=GRID_TABLE)[0]
-            row["first"], row["count"] = sum(map(len, values)), grid.values.shape
+            first = sum(map(len, values))
+            row["first"], row["count"] = first, grid.values.shape
+            row["first_point"], row["point_count"] = first + grid.values.size, len(grid.points)
             row["origin"], row["cell"] = mesh.scale * grid.origin, mesh.scale * grid.cell
             row["low"], row["high"] = mesh.scale * grid.low, mesh.scale * grid.high
             rows.append(row)
-            values.append(mesh.scale * grid.values.ravel())
+            values += [mesh.scale * grid.values.ravel(), mesh.scale * grid.points.ravel()]
         index[k] = known[mesh]
     return index, np.array(rows, dtype=GRID_TABLE), np.concatenate(values)

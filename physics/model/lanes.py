@@ -30,6 +30,8 @@ def make_constants(features: Features):
                 model.sample,
                 model.field,
                 model.joint_row,
+                model.grid,
+                model.grid_value,
             )
         return model
 

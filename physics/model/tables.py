@@ -146,12 +146,14 @@ HIDDEN_FACE = np.dtype(
 # one row per distance grid of a mesh, in the mesh's frame at size 1
 GRID_TABLE = np.dtype(
     [
-        ("first", "i8"),  # into Model.grid_value
+        ("first", "i8"),  # into Model.grid_value, where its distances begin
         ("count", "i8", (3,)),  # nodes along each axis
         ("origin", "f8", (3,)),  # m, of the first node
         ("cell", "f8"),  # m
         ("low", "f8", (3,)),  # m, corners of the mesh's bounding box
         ("high", "f8", (3,)),
+        ("first_point", "i8"),  # likewise, where x y z of its surface points begin
+        ("point_count", "i8"),
     ],
     align=True,
 )
@@ -218,7 +220,7 @@ class Model(NamedTuple):
         field: [f] of FIELD.
         joint_row: [r] of JOINT_ROW.
         grid: [g] of GRID_TABLE.
-        grid_value: [n] m, signed distances at the nodes of all grids, at size 1.
+        grid_value: [n] m at size 1, of each grid the distances at its nodes, then surface points.
     """
 
     dynamic: Array

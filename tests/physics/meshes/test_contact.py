@@ -5,6 +5,7 @@ import pytest
 
 from physics import Body, Box, Fidelity, Ground, Material, Mesh, Scene, Sphere, Static, World
 from physics.reference import meshes
+from physics.rotation import rotate, rotate_back
 
 ROUGH = Material(friction=0.5, restitution=0.0)
 BOX = Box((0.02, 0.02, 0.02))
@@ -22,11 +23,11 @@ def at(mesh, position, orientation=(0.0, 0.0, 0.0, 1.0)):
     return {"position": place, "orientation": turn, "material": ROUGH}
 
 
-def alone(shape, fidelity="balanced", material=ROUGH, **state):
+def alone(shape, fidelity="balanced", restitution=0.0, **state):
     """A world of one body on the ground. A cube and a box have the same kernel."""
-    return World(
-        Scene([Body(shape, mass=0.1, material=material, **state)], [Ground(material)]), fidelity
-    )
+    material = Material(friction=0.5, restitution=restitution)
+    body = Body(shape, mass=0.1, material=material, **state)
+    return World(Scene([body], [Ground(material)]), fidelity)
 
 
 # --- against Box ----------------------------------------------------------------------------------
@@ -44,10 +45,9 @@ def test_a_meshed_cube_slides_as_far_as_a_box():
 
 @pytest.mark.parametrize("restitution", [0.5, 1.0])
 def test_a_meshed_cube_bounces_as_high_as_a_box(restitution):
-    elastic = Material(friction=0.0, restitution=restitution)
     speed = []
     for shape in (BOX, CUBE):
-        world = alone(shape, material=elastic, position=(0, 0, 0.1))
+        world = alone(shape, restitution=restitution, position=(0, 0, 0.1))
         world.advance(0.16)
         speed.append(world.linear_velocity[0, 0])
     np.testing.assert_allclose(speed[1], speed[0], atol=1e-9)
@@ -55,25 +55,21 @@ def test_a_meshed_cube_bounces_as_high_as_a_box(restitution):
 
 
 def spin_after_landing_on_an_edge(shape):
-    world = alone(
-        shape, position=(0, 0, 0.06), orientation=(0.0, 0.1736, 0.0, 0.9848),
-        fidelity=Fidelity(substep=5e-4, contact_resolution=0.2),
-    )  # fmt: skip
+    fidelity = Fidelity(substep=5e-4, contact_resolution=0.2)
+    turned = {"position": (0, 0, 0.06), "orientation": (0.0, 0.26, 0.0, 0.97)}
+    world = alone(shape, fidelity, **turned)
     world.advance(0.12)
     return world.angular_velocity[0, 0, 1]
 
 
 def test_a_landing_on_an_edge_converges_to_that_of_a_box_with_the_cells():
-    """The grid rounds edges by 1.5 cells, which shortens the lever arm of the landing."""
-    exact = spin_after_landing_on_an_edge(BOX)
-    errors = [
-        abs(
-            spin_after_landing_on_an_edge(mesh_of(meshes.cuboid(BOX.half_extents), cells=n)) - exact
-        )
-        for n in (12, 24, 48, 96)
-    ]
+    """Samples are inset by 1.5 cells, which rounds the edges and moves the point of landing."""
+    exact, errors = spin_after_landing_on_an_edge(BOX), []
+    for cells in (12, 24, 48, 96):
+        cube = mesh_of(meshes.cuboid(BOX.half_extents), cells=cells)
+        errors.append(abs(spin_after_landing_on_an_edge(cube) / exact - 1.0))
     assert np.all(np.diff(errors) < 0.0)
-    assert errors[-1] < 0.02 * abs(exact)
+    assert errors[-1] < 0.01
 
 
 def test_particles_of_a_meshed_cube_carry_it_at_the_height_of_a_box():
@@ -86,36 +82,34 @@ def test_particles_of_a_meshed_cube_carry_it_at_the_height_of_a_box():
     assert heights[1] == pytest.approx(heights[0], abs=1e-9)
 
 
-# --- resting, rolling and holding, all in one scene, which has one kernel --------------------------
+# --- resting, rolling and holding, all in one scene, which has one kernel ------------------------
 
-NAMES = ["bowl", "ball", *(f"cube {i}" for i in range(3)), "standing", "tipped", "large ball"]
+NAMES = ("bowl", "ball", "standing", "tipped", "large ball")
 
 
 def scene():
     bowl = mesh_of(meshes.bowl(0.05, 0.036, 32), cells=32)
     knight = mesh_of(meshes.knight(around=20, along=40), cells=32)
     slab = mesh_of(meshes.cuboid((0.1, 0.1, 0.02)), cells=24)
+    tipped = at(knight, (-0.5, 0, 0.05), (0.6, 0.1, 0.0, 0.79))
     bodies = [
         Body(bowl, mass=0.3, name="bowl", **at(bowl, (0, 0, 0.04))),
         Body(Sphere(0.01), mass=0.02, position=(0.02, 0, 0.04), material=ROUGH, name="ball"),
-        *(
-            Body(CUBE, mass=0.1, position=(0.3, 0, 0.02 + 0.04 * i), material=ROUGH, name=f"cube {i}")
-            for i in range(3)
-        ),
         Body(knight, mass=0.05, name="standing", **at(knight, (-0.3, 0, 0))),
-        Body(
-            knight, mass=0.05, name="tipped",
-            **at(knight, (-0.5, 0, 0.05), (0.6, 0.1, 0.0, 0.79)),
-        ),
+        Body(knight, mass=0.05, name="tipped", **tipped),
         # far larger than the margin of the slab's grid
         Body(Sphere(0.08), mass=0.1, position=(0, 0.5, 0.12), material=ROUGH, name="large ball"),
-    ]  # fmt: skip
+    ]
+    for i, shapes in enumerate(((BOX,) * 3, (CUBE,) * 3, (CUBE, BOX, CUBE), (BOX, CUBE, CUBE))):
+        for k, shape in enumerate(shapes):
+            place = (0.3, 0.2 * i, 0.02 + 0.04 * k)
+            bodies.append(Body(shape, mass=0.1, position=place, material=ROUGH))
     return Scene(bodies, [Ground(ROUGH), Static(slab, position=(0, 0.5, 0.02), material=ROUGH)])
 
 
 @pytest.fixture(scope="module", params=["balanced", "solid"])
 def settled(request):
-    """The scene after 4 s, and the heights of all bodies in between."""
+    """The scene after 4 s, and the heights of all bodies until then."""
     world, heights = World(scene(), request.param), []
     for _ in range(80):
         world.advance(0.05)
@@ -123,16 +117,15 @@ def settled(request):
     return world, np.array(heights)
 
 
-def test_a_tower_of_three_meshed_cubes_stands_where_that_of_boxes_does(settled):
+def test_towers_of_meshed_cubes_stand_as_those_of_boxes_do(settled):
+    """Also those of both kinds: boxes on meshes, and meshes on boxes."""
     world, _ = settled
-    boxes = [
-        Body(BOX, mass=0.1, position=(0, 0, 0.02 + 0.04 * i), material=ROUGH) for i in range(3)
-    ]
-    tower = World(Scene(boxes, [Ground(ROUGH)]), world.fidelity)
-    tower.advance(2.0)
-    found = world.position[0, 2:5] - np.array((0.3, 0.0, 0.0))
-    np.testing.assert_allclose(found, tower.position[0], atol=1e-4)
-    assert np.abs(world.linear_velocity[0, 2:5]).max() < 1e-3
+    towers = world.position[0, 5:].reshape(4, 3, 3) - np.array((0.3, 0.0, 0.0))
+    towers = towers - np.array([(0.0, 0.2 * i, 0.0) for i in range(4)])[:, None]
+    np.testing.assert_allclose(towers[0, :, 2], (0.02, 0.06, 0.1), atol=2e-3)
+    for tower in towers[1:]:
+        np.testing.assert_allclose(tower, towers[0], atol=2e-4)
+    assert np.abs(world.linear_velocity[0, 5:]).max() < 2e-3
 
 
 def test_a_ball_stays_in_a_bowl(settled):
@@ -141,8 +134,7 @@ def test_a_ball_stays_in_a_bowl(settled):
     assert np.linalg.norm(ball[:2] - bowl[:2]) < 0.026
     assert np.all(heights[:, 1] < 0.045)
     assert np.all(heights[:, 1] > 0.012)  # it does not sink through
-    # it comes to rest at the bottom
-    assert np.ptp(heights[-20:, 1]) < np.ptp(heights[:20, 1])
+    assert np.ptp(heights[-20:, 1]) < 0.5 * np.ptp(heights[:20, 1])  # it comes to rest
 
 
 def test_a_knight_stands(settled):
@@ -163,32 +155,36 @@ def test_a_tipped_knight_rolls_onto_its_side_and_rests(settled):
 
 def test_a_ball_larger_than_the_grid_rests_on_a_meshed_static(settled):
     world, heights = settled
-    assert heights[-1, -1] == pytest.approx(0.12, abs=3e-4)
-    np.testing.assert_allclose(world.position[0, -1, :2], (0.0, 0.5), atol=1e-3)
+    i = NAMES.index("large ball")
+    assert heights[-1, i] == pytest.approx(0.12, abs=3e-4)
+    np.testing.assert_allclose(world.position[0, i, :2], (0.0, 0.5), atol=1e-3)
 
 
 def test_momentum_is_conserved_between_two_meshes():
-    """Without gravity and ground, in the kernel of the scene above but for friction on a static."""
-    knight = mesh_of(meshes.knight(around=20, along=40), cells=32)
-    bodies = [
-        Body(knight, mass=0.05, position=(0, 0, 0), linear_velocity=(0.2, 0.01, 0), material=ROUGH),
-        Body(CUBE, mass=0.1, position=(0.06, 0, 0), material=ROUGH, angular_velocity=(3, 2, 1)),
-    ]
-    world = World(Scene(bodies, gravity=(0, 0, 0)))
-    before = momenta(world)
+    """In the air, about their common centre of mass, which falls freely."""
+    world = World(scene())
+    pair = [NAMES.index("standing"), 8]  # a knight and a meshed cube
+    position, velocity = world.position.copy(), world.linear_velocity.copy()
+    omega = world.angular_velocity.copy()
+    position[0, pair] = (0.0, 0.0, 5.0), (0.06, 0.0, 5.0)
+    velocity[0, pair] = (0.2, 0.01, 0.0), (0.0, 0.0, 0.0)
+    omega[0, pair] = (0.0, 0.0, 0.0), (3.0, 2.0, 1.0)
+    world.set_state(position=position, linear_velocity=velocity, angular_velocity=omega)
+    before = momenta(world, pair)
     world.advance(0.6)
-    assert len(world.contacts().pair) == 0
-    assert np.linalg.norm(world.linear_velocity[0, 1]) > 0.01
-    for old, new in zip(before, momenta(world), strict=True):
-        np.testing.assert_allclose(new, old, atol=1e-15)
+    (p, L), fall = momenta(world, pair), np.array((0.0, 0.0, -9.81 * 0.15 * 0.6))
+    assert np.linalg.norm(world.linear_velocity[0, 8, :2]) > 0.01  # they have touched
+    np.testing.assert_allclose(p, before[0] + fall, atol=1e-12)
+    np.testing.assert_allclose(L, before[1], atol=1e-12)
 
 
-def momenta(world):
-    """Momentum in kg m/s and angular momentum about the origin in kg m^2/s."""
-    from physics.rotation import rotate, rotate_back
-
-    mass = np.array([body.mass for body in world.scene.bodies])[:, None]
-    inertia = np.array([body.shape.inertia(body.mass) for body in world.scene.bodies])
-    p, q = mass * world.linear_velocity[0], world.orientation[0]
-    own = rotate(q, inertia * rotate_back(q, world.angular_velocity[0]))
-    return p.sum(axis=0), (np.cross(world.position[0], p) + own).sum(axis=0)
+def momenta(world, pair):
+    """Of two bodies: momentum in kg m/s, angular momentum about their centre in kg m^2/s."""
+    bodies = [world.scene.bodies[i] for i in pair]
+    mass = np.array([body.mass for body in bodies])[:, None]
+    inertia = np.array([body.shape.inertia(body.mass) for body in bodies])
+    p, c = mass * world.linear_velocity[0, pair], world.position[0, pair]
+    q = world.orientation[0, pair]
+    own = rotate(q, inertia * rotate_back(q, world.angular_velocity[0, pair]))
+    arm = c - (mass * c).sum(axis=0) / mass.sum()
+    return p.sum(axis=0), (np.cross(arm, p) + own).sum(axis=0)
