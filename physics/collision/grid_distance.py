@@ -7,8 +7,8 @@ edge is rounded by about a cell.
 Beyond the grid, for balls and capsules larger than its margin, the nearest point of the mesh is
 searched. At a point q near the border it is q - d grad d. If c is nearest to a point p, it is
 nearest to all points between c and p, too. So from a guess of c, q is the point between c and p
-that is one margin from c, which gives the next c. The first guess is the nearest of some hundred points
-of the surface. The distance is wrong by up to a tenth of a cell.
+that is one margin from c, which gives the next c. The first guess is the nearest of some hundred
+points of the surface. The distance is wrong by up to a tenth of a cell.
 
 Positions and grids are looked up lane by lane. A loop over lanes then reads what was found.
 """

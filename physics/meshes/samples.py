@@ -125,10 +125,10 @@ def _curves(vertices: Array, edges: _Edges) -> tuple[list[list[tuple[int, int]]]
     more than 30 degrees. The last entry of a curve has the edge -1.
     """
     at: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for e in np.flatnonzero(edges.sharp):
+    for e in np.flatnonzero(edges.sharp).tolist():
         a, b = (int(v) for v in edges.ends[e])
-        at[a].append((b, int(e)))
-        at[b].append((a, int(e)))
+        at[a].append((b, e))
+        at[b].append((a, e))
 
     def is_corner(v: int) -> bool:
         if len(at[v]) != 2:
@@ -141,11 +141,11 @@ def _curves(vertices: Array, edges: _Edges) -> tuple[list[list[tuple[int, int]]]
     curves = []
     # curves between corners first; what is left are loops without a corner
     for start in [*sorted(corner), *sorted(at)]:
-        for _, first in list(at[start]):
+        for _, first in at[start]:
             if used[first]:
                 continue
             curve: list[tuple[int, int]] = []
-            v, e = int(start), int(first)
+            v, e = start, first
             while e >= 0:
                 used[e] += 1
                 curve.append((v, e))

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics import Box, Compound, Gripper, Part, Sphere, Static
+from physics import Box, Compound, Gripper, Mesh, Part, Sphere, Static
 from physics.rotation import multiply, rotate
 from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
 
@@ -55,7 +55,14 @@ def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item
 def _solid(
     shape: object, position: Array, orientation: Array, color: Color, balls: Particles | None
 ) -> list[Item]:
-    """A solid as an item; a compound as one for each part, each with the balls nearest to it."""
+    """A solid as an item; a compound as one for each part, each with the balls nearest to it.
+
+    A mesh is a box of faint lines around balls along its surface.
+    """
+    if isinstance(shape, Mesh):
+        positions, _, radius = shape.samples(shape.width / 8.0, shape.width / 16.0)
+        box = Box(shape.surface(0.0).parameters)
+        return [Item(box, position, orientation, color, balls or Particles(positions, radius))]
     if not isinstance(shape, Compound):
         return [Item(shape, position, orientation, color, balls)]
     found, nearest = [], np.zeros(0)
