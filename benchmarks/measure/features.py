@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from benchmarks.report.tables import Cell, Table
 from benchmarks.report.timing import Side, take_turns
-from physics import Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
+from physics import Body, Box, Drive, Fidelity, Ground, Material, Mesh, Scene, Sphere, World
+from physics.reference import meshes
 from physics.reference.scenes import tilted_gravity
 from physics.scene.solids import Static
 from physics.scene.validation import Vector
@@ -63,6 +64,13 @@ def _slope() -> Scene:
     return replace(_cube(), gravity=tilted_gravity(0.2))
 
 
+def _meshed(cubes: int) -> Scene:
+    """A tower of cubes as meshes."""
+    vertices, faces = meshes.cuboid(CUBE.half_extents)
+    scene, mesh = _cube(cubes=cubes), Mesh(vertices=vertices, faces=faces)
+    return replace(scene, bodies=[replace(body, shape=mesh) for body in scene.bodies])
+
+
 # name: the scene that it extends, scene, fidelity
 CASES: dict[str, tuple[str, Scene, Fidelity]] = {
     "ball flies": ("", _flying(Sphere(0.02), 0.0), Fidelity()),
@@ -93,6 +101,8 @@ CASES: dict[str, tuple[str, Scene, Fidelity]] = {
         _cube(cubes=2),
         Fidelity(geometry="particle"),
     ),
+    "meshed cube rests": ("cube rests", _meshed(1), Fidelity()),
+    "two meshed cubes stacked": ("two cubes stacked", _meshed(2), Fidelity()),
 }
 
 
