@@ -14,7 +14,7 @@ from physics.analysis.integrator_limits import check_integrator
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
-from physics.model.features import NO_ROTATION, Features
+from physics.model.features import Features
 from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.scene.fidelity import Fidelity, resolve
 from physics.scene.parameters import Parameters, check_ranges, check_values
@@ -24,7 +24,8 @@ from physics.snapshot import Snapshot
 from physics.step.readout import Readout
 from physics.step.simulation import Simulation, read_only
 from physics.step.threads import check_threads
-from physics.step.write_state import write_motors, write_state
+from physics.step.write_forces import write_motors, write_wrench
+from physics.step.write_state import write_state
 
 Array = np.ndarray
 
@@ -220,20 +221,7 @@ class World:
             TypeError, ValueError: no such body, a wrong shape, or a value that isn't finite; a
                 torque or point in a scene whose rotation isn't simulated. Nothing is then added.
         """  # fmt: skip
-        simulation, bodies = self._simulation, len(self.scene.bodies)
-        chosen: slice | int = slice(None) if body is None else self.scene.body_index(body)
-        shape = (self.count, bodies, 3) if body is None else (self.count, 3)
-        new = np.zeros((self.count, bodies, 6))
-        push, turn = array("force", force, shape), array("torque", torque, shape)
-        if point is not None:
-            turn = turn + np.cross(array("point", point, shape) - self.position[:, chosen], push)
-        if simulation.features.rotation == NO_ROTATION and turn.any():
-            raise ValueError(
-                "torque and point must leave frictionless balls at rest without a torque, because "
-                "their rotation is not simulated; give a Body in the Scene friction or spin"
-            )
-        new[:, chosen, :3], new[:, chosen, 3:] = push, turn
-        simulation.add_wrench(new)
+        write_wrench(self._simulation, force, torque, body, point)
 
     def command_motors(self, velocity: Any) -> None:
         """Sets the velocities to which the motors of joints drive; they hold until changed.

@@ -37,7 +37,7 @@ def read_mesh(source: Any) -> tuple[Array, Array]:
     if not os.path.isfile(source):
         raise ValueError(f"Mesh.source must be an existing file, got {os.fspath(source)!r}")
     try:
-        loaded = trimesh.load_mesh(source)
+        loaded: Any = trimesh.load_mesh(source)
         # a scene of several meshes, each with its pose
         loaded = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
         vertices, faces = np.asarray(loaded.vertices), np.asarray(loaded.faces)

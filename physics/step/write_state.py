@@ -60,20 +60,6 @@ def write_state(simulation: Simulation, given: Mapping[str, Any], worlds: Array)
     simulation.forget(worlds)
 
 
-def write_motors(simulation: Simulation, name: str, values: Any) -> None:
-    """Writes the "velocity" or the "position" [count, motors] that motors drive to.
-
-    Raises:
-        ValueError: see `World.command_motors`.
-    """
-    motor = simulation.state.motor
-    if motor.shape[1] == 0:
-        raise ValueError(f"{name} needs a Hinge or Slider with a Motor in Scene.joints")
-    checked = array(name, values, motor.shape[:2])
-    motor[..., 0] = checked if name == "velocity" else 0.0
-    motor[..., 1] = checked if name == "position" else np.nan
-
-
 def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> dict[str, Array]:
     """Checks the given values and broadcasts them to arrays [chosen, ...].
 
