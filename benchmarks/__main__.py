@@ -14,6 +14,7 @@ from benchmarks.measure import (
     rendering,
     speed,
     startup,
+    time_control,
     tradeoff,
     work_precision,
     worlds,
@@ -32,6 +33,7 @@ MODULES = {
     "accuracy": accuracy,
     "features": features,
     "tradeoff": tradeoff,
+    "time_control": time_control,
     "work_precision": work_precision,
 }
 

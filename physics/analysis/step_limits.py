@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from physics.analysis import field_limits, stability
+from physics.analysis.time_control_limits import check_time_control
 from physics.model.build import build
 from physics.model.features import Features
 from physics.model.pairs import spacing
@@ -28,6 +29,7 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
             solid that limits it and the largest safe step), or a spring or drag of `Scene.fields`
             does, or a body would sink into the ground.
     """
+    check_time_control(scene, fidelity, model, features)
     _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
     _check_fields(scene, fidelity, model)

@@ -13,6 +13,7 @@ import math
 from physics.compiler.jit import at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
+from physics.model.workspace import MEETS
 from physics.motion.vectors import cross, rotated
 from physics.scene.shapes import PARTICLES
 
@@ -78,9 +79,9 @@ def _farthest(manifold, n, face, x, y, z, highest):
 
 
 @stage
-def _span(manifold, n, face, deepest, skin, x, y, z):
+def _span(manifold, n, face, deepest, deeper, x, y, z):
     """Four points of a face whose mean is x y z, fewer if they lie on a line; -1 for none."""
-    low = manifold[deepest].separation + _DEEPER * skin
+    low = manifold[deepest].separation + deeper
     first, far = _farthest(manifold, n, face, x, y, z, low)
     p, normal = manifold[first].position, manifold[deepest].normal
     second, far = _farthest(manifold, n, face, p[0], p[1], p[2], math.inf)
@@ -99,8 +100,10 @@ def _span(manifold, n, face, deepest, skin, x, y, z):
 
 
 @stage
-def reduce_face(manifold, n, face, skin):
+def reduce_face(manifold, n, face, deeper):
     """Assigns a face number to the deepest free point and those with its normal; keeps four.
+
+    At least one of them is at most `deeper` m less deep than the deepest.
 
     Returns:
         False if no point is free.
@@ -126,7 +129,7 @@ def reduce_face(manifold, n, face, skin):
             z += manifold[j].position[2]
     if members <= 4:
         return True
-    four = _span(manifold, n, face, deepest, skin, x / members, y / members, z / members)
+    four = _span(manifold, n, face, deepest, deeper, x / members, y / members, z / members)
     chosen = 0
     for j in range(n):
         if manifold[j].face == face:
@@ -142,6 +145,7 @@ def reduce_face(manifold, n, face, skin):
 def make_manifold_reduction(features, clear):
     """Stage that reduces the lists, just made, of a half-pair and its reverse in one lane."""
     memory_size, mesh = contact_memory(features).size, features.mesh
+    timed = features.finds_impacts
 
     @stage
     def move(candidate, ids, i, source, target):
@@ -190,8 +194,10 @@ def make_manifold_reduction(features, clear):
             s, slot = (k, j) if j < count else (reverse, j - count)
             manifold[j].weight = state.candidate[g, model.half_pair[s].first_slot + slot].weight[i]
             manifold[j].face = 0
-        face = 1
-        while reduce_face(manifold, n, face, at(half_pair.skin, i)):
+        face, deeper = 1, _DEEPER * at(half_pair.skin, i)
+        if timed and workspace.clock[0].phase[i] == MEETS:  # what touches must be among the four
+            deeper = half_pair.impact_tolerance
+        while reduce_face(manifold, n, face, deeper):
             face += 1
         drop(model, state, workspace, g, k, i, manifold[:count])
         if reverse >= 0:

@@ -34,6 +34,7 @@ from physics.impulse.point_impulses import (
     relative_velocity,
 )
 from physics.model.features import cached_by_features
+from physics.model.workspace import GIVEN
 from physics.motion.drives import make_finger_velocity_coupling
 
 # Sweeps end when none has changed a velocity by more than this fraction of the fastest approach
@@ -41,28 +42,42 @@ TOLERANCE = 1e-6
 MAX_SWEEPS = 64
 
 
-@stage
-def find_impacts(pair, constants, h, lane):
-    """Notes the restitution of each colliding point, -1 of others, and which lanes have any."""
-    points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
-    restitution, floors = constants.restitution, constants.rest_speed
-    fastest, largest = lane.fastest_approach, lane.impact_restitution
-    for n in range(points.shape[0]):
-        point = points[n]
-        for i in range(LANES):
-            e, floor = at(restitution, i), at(floors, i)
-            ux, uy, uz = relative_velocity(owner, surface, point, i)
-            nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
-            un = ux * nx + uy * ny + uz * nz
-            collides = (un < -floor) & (point.separation[i] + 0.5 * h * un <= TOUCH_TOLERANCE)
-            collides = collides & (point.weight[i] > 0.0)
-            point.impact_restitution[i] = e if collides else -1.0
-            point.normal_impact[i] = 0.0
-            for axis in range(3):
-                point.tangential_impact[axis, i] = 0.0
-            lane.colliding[i] = 1 if collides else lane.colliding[i]
-            fastest[i] = max(fastest[i], -un) if collides else fastest[i]
-            largest[i] = max(largest[i], e) if collides else largest[i]
+@cached_by_features
+def make_find_impacts(features):
+    """Stage that notes the restitution of each colliding point of a half-pair, -1 of others.
+
+    It also notes which lanes have any.
+    """
+    timed = features.finds_impacts
+
+    @stage
+    def find_impacts(workspace, k, pair, constants, h):
+        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+        restitution, floors = constants.restitution, constants.rest_speed
+        lane = workspace.lane[0]
+        fastest, largest = lane.fastest_approach, lane.impact_restitution
+        for n in range(points.shape[0]):
+            point = points[n]
+            for i in range(LANES):
+                e, floor = at(restitution, i), at(floors, i)
+                ux, uy, uz = relative_velocity(owner, surface, point, i)
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
+                un = ux * nx + uy * ny + uz * nz
+                if timed:
+                    horizon, reach = workspace.timing[k].horizon[i], workspace.timing[k].reach[i]
+                    touches = point.separation[i] + horizon * h * un <= reach
+                else:
+                    touches = point.separation[i] + 0.5 * h * un <= TOUCH_TOLERANCE
+                collides = (un < -floor) & touches & (point.weight[i] > 0.0)
+                point.impact_restitution[i] = e if collides else -1.0
+                point.normal_impact[i] = 0.0
+                for axis in range(3):
+                    point.tangential_impact[axis, i] = 0.0
+                lane.colliding[i] = 1 if collides else lane.colliding[i]
+                fastest[i] = max(fastest[i], -un) if collides else fastest[i]
+                largest[i] = max(largest[i], e) if collides else largest[i]
+
+    return find_impacts
 
 
 @stage
@@ -160,35 +175,51 @@ def apply_restitution(pair, lane, rescale):
             apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
 
 
-@stage
-def apply_impacts(model, workspace, refresh):
-    """Changes momenta by the impact impulses; a refresh only counts them among the forces."""
-    for k in range(model.half_pair.shape[0]):
-        pair = operands_of(model, workspace, k)
-        points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
-        P, L = owner.momentum, owner.angular_momentum
-        Q, M = surface.momentum, surface.angular_momentum
-        for n in range(points.shape[0]):
-            point = points[n]
-            normal, tangential = point.normal, point.tangential_impact
-            extra = point.extra_impulse
-            for i in range(LANES):
-                size = point.normal_impact[i]
-                px = size * normal[0, i] + tangential[0, i]
-                py = size * normal[1, i] + tangential[1, i]
-                pz = size * normal[2, i] + tangential[2, i]
-                if refresh:
-                    extra[0, i] += px
-                    extra[1, i] += py
-                    extra[2, i] += pz
-                    continue
-                add_opposite(point, i, P, L, Q, M, px, py, pz)
+@cached_by_features
+def make_apply_impacts(features):
+    """Stage that changes momenta by the impact impulses.
+
+    A refresh only counts them among the forces; time control has to know which part of them it is.
+    """
+    timed = features.finds_impacts
+
+    @stage
+    def apply_impacts(model, workspace, refresh):
+        for k in range(model.half_pair.shape[0]):
+            pair = operands_of(model, workspace, k)
+            points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+            P, L = owner.momentum, owner.angular_momentum
+            Q, M = surface.momentum, surface.angular_momentum
+            if timed and refresh:
+                one = workspace.kept[GIVEN, model.half_pair[k].owner]
+                other = workspace.kept[GIVEN, model.half_pair[k].surface]
+                P, L = one.momentum, one.angular_momentum
+                Q, M = other.momentum, other.angular_momentum
+            for n in range(points.shape[0]):
+                point = points[n]
+                normal, tangential = point.normal, point.tangential_impact
+                extra = point.extra_impulse
+                for i in range(LANES):
+                    size = point.normal_impact[i]
+                    px = size * normal[0, i] + tangential[0, i]
+                    py = size * normal[1, i] + tangential[1, i]
+                    pz = size * normal[2, i] + tangential[2, i]
+                    if refresh:
+                        extra[0, i] += px
+                        extra[1, i] += py
+                        extra[2, i] += pz
+                        if not timed:
+                            continue
+                    add_opposite(point, i, P, L, Q, M, px, py, pz)
+
+    return apply_impacts
 
 
 @cached_by_features
 def make_impacts(features):
     """Stage that lets contacts collide, in the worlds in which any do."""
-    impact_sweep = make_impact_sweep(features)
+    impact_sweep, apply_impacts = make_impact_sweep(features), make_apply_impacts(features)
+    find_impacts = make_find_impacts(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
@@ -257,7 +288,8 @@ def make_impacts(features):
             lane.impact_restitution[i] = 0.0
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
-                find_impacts(operands_of(model, workspace, k), model.half_pair[k], h, lane)
+                pair = operands_of(model, workspace, k)
+                find_impacts(workspace, k, pair, model.half_pair[k], h)
         for i in range(LANES):
             lanes += lane.colliding[i]
         return lanes

@@ -11,7 +11,7 @@ from physics.model.coefficients import (
     dynamic_columns,
     half_pair_columns,
 )
-from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION, Features
+from physics.model.features import FIXED, GENERAL, ISOTROPIC, NO_ROTATION, Features
 from physics.model.fields import field_rows
 from physics.model.grids import grid_rows
 from physics.model.joints import joint_rows
@@ -26,7 +26,7 @@ from physics.model.tables import (
     HIDDEN_FACE,
     Model,
 )
-from physics.scene.fidelity import INTEGRATORS, Fidelity
+from physics.scene.fidelity import INTEGRATORS, TIME_CONTROLS, Fidelity
 from physics.scene.fields import PointSpring
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.mesh import Mesh
@@ -177,6 +177,7 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         ends = (layout.solids[owner], layout.solids[surface])
         row["keeps_all"] = any(isinstance(getattr(s, "shape", None), Mesh) for s in ends)
         row["slide_slope"] = 1.0
+        row["impact_tolerance"] = layout.fidelity.impact_tolerance
         for sign, body, other in ((1.0, owner, surface), (-1.0, surface, owner)):
             if body < layout.bodies and other >= layout.dynamic_count:
                 row["gravity"] = sign * layout.gravity
@@ -249,4 +250,5 @@ def _features(
         joints=bool(scene.joints),
         compound=len(model.compound_part) > 0,
         per_world_parameters=per_world_parameters,
+        time_control=TIME_CONTROLS.index(fidelity.time_control) if len(model.half_pair) else FIXED,
     )

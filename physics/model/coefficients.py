@@ -158,6 +158,7 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "surface_size": size[:, b],
         "load_share": np.where(shared, other / (own + other), 1.0),
         "skin": fidelity.skin * np.minimum(moving[:, a], moving[:, b]),
+        "free_motion": 0.5 * fidelity.courant * np.minimum(widths[:, a], widths[:, b]),
         "stiffness": stiffness,
         "damping": damping,
         "damping_error": damping_error,

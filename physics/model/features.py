@@ -13,6 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 NO_ROTATION, ISOTROPIC, GENERAL = range(3)
 # values of `Fidelity.integrator`
 MIDPOINT, EULER, RK4, ADAPTIVE = range(4)
+# time control, in the order of `fidelity.TIME_CONTROLS`
+FIXED, HALVED, BISECTION, ADVANCEMENT, SWEPT = range(5)
 
 
 class Features(NamedTuple):
@@ -38,6 +40,7 @@ class Features(NamedTuple):
         joints: the scene has joints.
         compound: at least one surface is a part of a compound and has its own frame.
         per_world_parameters: masses, materials and sizes can differ between worlds.
+        time_control: FIXED, HALVED, BISECTION, ADVANCEMENT or SWEPT.
     """
 
     integrator: int
@@ -63,6 +66,12 @@ class Features(NamedTuple):
     joints: bool
     compound: bool
     per_world_parameters: bool
+    time_control: int = FIXED
+
+    @property
+    def finds_impacts(self) -> bool:
+        """Whether steps are cut at the times of impacts."""
+        return self.time_control in (BISECTION, ADVANCEMENT, SWEPT)
 
 
 Made = TypeVar("Made")

@@ -69,6 +69,9 @@ HALF_PAIR = np.dtype(
         ("surface_size", "f8"),  # factor on the partners' positions
         ("load_share", "f8"),  # fraction of the pair's load, factor on the samples' weights
         ("skin", "f8"),  # m
+        # of time control: m per substep that counts as slow, and m at which an impact has arrived
+        ("free_motion", "f8"),
+        ("impact_tolerance", "f8"),
         ("stiffness", "f8"),  # N/m of a whole face
         ("damping", "f8"),  # coefficient of the law
         ("damping_error", "f8"),  # relative, per (omega h)^2, see normal_damping.py
@@ -100,6 +103,7 @@ HALF_PAIR_PER_WORLD = (
     "surface_size",
     "load_share",
     "skin",
+    "free_motion",
     "stiffness",
     "damping",
     "damping_error",

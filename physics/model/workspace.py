@@ -9,7 +9,7 @@ import numpy as np
 
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.contact_memory import contact_memory
-from physics.model.features import ADAPTIVE, RK4, Features, cached_by_features
+from physics.model.features import ADAPTIVE, FIXED, RK4, Features, cached_by_features
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -202,6 +202,39 @@ JOINT_WORK = np.dtype(
 POSE = np.dtype([("position", "f8", (3, LANES)), ("orientation", "f8", (4, LANES))], align=True)
 
 
+# one row per half-pair, of time control, see step/event_steps.py
+TIMING = np.dtype(
+    [
+        ("timed", "i8", (LANES,)),  # 1: impacts are found on the way
+        # a sample whose separation less `horizon` steps of approach is at most `reach` touches
+        ("horizon", "f8", (LANES,)),
+        ("reach", "f8", (LANES,)),  # m
+        ("impulse", "f8", (LANES,)),  # N s, normal, of the impacts on the way in this step
+        ("waiting_skin", "f8", (LANES,)),  # m, `remaining_skin` while other lanes take a step
+    ],
+    align=True,
+)
+
+# a single row, of time control
+CLOCK = np.dtype(
+    [
+        ("active", "i8", (LANES,)),  # `LANE.active` while lanes wait
+        ("updates_memory", "i8", (LANES,)),  # likewise
+        ("phase", "i8", (LANES,)),  # of an impact on the way, see step/event_steps.py
+        ("time", "f8", (LANES,)),  # s since the substep began
+        ("impacts", "i8", (LANES,)),  # in this substep
+        ("halvings", "i8", (LANES,)),  # of the substep, see step/short_steps.py
+        ("stale", "i8", (LANES,)),  # 1: the forces are those of another step than the substep
+    ],
+    align=True,
+)
+# values of CLOCK.phase: no impact on the way, may have one, is at one, has had some
+FREE, MAY_MEET, MEETS, HAS_MET = range(4)
+# rows of `Workspace.kept`: when the substep began, at the end of a path with impacts, where a
+# bisection began; momenta that a refresh's collisions have given to the forces
+BEGINNING, END, BRACKET, GIVEN = range(4)
+
+
 @cached_by_features
 def remembered_dtype(features: Features) -> np.dtype:
     """One row per candidate of a list that is being replaced."""
@@ -228,6 +261,9 @@ class Workspace(NamedTuple):
         start_pose: [dynamic bodies] of POSE; with joints.
         trial: [dynamic bodies] of TRIAL; Runge-Kutta methods.
         pace: [1] of LANE_PACE; Runge-Kutta methods.
+        timing: [half-pairs] of TIMING; time control.
+        clock: [1] of CLOCK; time control.
+        kept: [4, solids] of SOLID, see BEGINNING; time control.
     """
 
     solid: Array
@@ -244,6 +280,9 @@ class Workspace(NamedTuple):
     start_pose: Array
     trial: Array
     pace: Array
+    timing: Array
+    clock: Array
+    kept: Array
 
     @classmethod
     def of(cls, model: Model, features: Features) -> "Workspace":
@@ -255,6 +294,7 @@ class Workspace(NamedTuple):
         slots = int(half_pair["slot_count"].sum())
         joints, rows = int(features.joints), model.joint_row
         entries = int((np.arange(len(rows)) - rows["first"]).sum())
+        kept = 0 if features.time_control == FIXED else 4
         return cls(
             solid=aligned_zeros(solids + len(model.compound_part) + joints, SOLID),
             relative=aligned_zeros(2, SOLID),
@@ -270,4 +310,7 @@ class Workspace(NamedTuple):
             start_pose=aligned_zeros(joints * len(model.dynamic), POSE),
             trial=aligned_zeros(len(model.dynamic) if trials else 0, TRIAL),
             pace=aligned_zeros(1 if trials else 0, LANE_PACE),
+            timing=aligned_zeros(len(half_pair) if kept else 0, TIMING),
+            clock=aligned_zeros(1, CLOCK),
+            kept=aligned_zeros((kept, solids), SOLID),
         )

@@ -1,5 +1,6 @@
 """Fidelity: the settings that trade speed for accuracy, and their presets."""
 
+import math
 from dataclasses import dataclass
 from typing import cast
 
@@ -13,6 +14,8 @@ FRICTIONS = ("coulomb", "viscous")
 INTEGRATORS = ("midpoint", "euler", "rk4", "adaptive")
 
 _TOLERANCE = 1e-6  # 1/s, of the adaptive integrator
+TIME_CONTROLS = ("fixed", "adaptive", "bisection", "advancement", "swept")
+_FIND_IMPACTS = ("bisection", "advancement", "swept")
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,19 @@ class Fidelity:
         tolerance: 1/s, error per second of the adaptive integrator: of positions in m, of rotations
             in rad, of velocities in m/s and of angular velocities in rad/s. 1e-6 if None. Others
             take none.
+        time_control: how a substep is divided where solids are fast. "fixed": it isn't; a body that
+            moves further per substep than a wall is thick can pass through it. "adaptive": a
+            world's substep is halved until no two solids can overlap by more than `courant` allows.
+            The others need law="impulse" and geometry="shape". They stop a world at the time of a
+            collision, resolve it, and continue with the rest of the substep. "bisection": if solids
+            overlap at the end of the substep, bisection finds when that began; it misses what has
+            passed by then. "advancement": every pair that approaches is advanced by no more than it
+            can move without touching; nothing is missed. "swept": the same, only for pairs that are
+            faster than `courant` allows; nothing is missed either.
+        courant: motion of two solids relative to each other per substep that "adaptive" and "swept"
+            accept, as a fraction of the half width of the thinner one. 0.01 to 1.
+        impact_tolerance: m, separation or overlap at which "bisection", "advancement" and "swept"
+            count two solids as touching. Below the skin of every pair of solids.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type, out of range or not supported by the
@@ -74,6 +90,9 @@ class Fidelity:
     skin: float = 0.1
     integrator: str = "midpoint"
     tolerance: float | None = None
+    time_control: str = "fixed"
+    courant: float = 0.5
+    impact_tolerance: float = 1e-6
 
     def __post_init__(self) -> None:
         """Checks every field."""
@@ -81,6 +100,8 @@ class Fidelity:
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
         choice("Fidelity.damping", self.damping, DAMPINGS)
         choice("Fidelity.friction", self.friction, FRICTIONS)
+        choice("Fidelity.time_control", self.time_control, TIME_CONTROLS)
+        self._check_time_control()
         for name, only in (("damping", "hunt_crossley"), ("friction", "coulomb")):
             if self.law == "impulse" and getattr(self, name) != only:
                 raise ValueError(
@@ -97,6 +118,8 @@ class Fidelity:
             "spacing": (0.01, 1.0),
             "rounding": (1e-3, 0.5),
             "skin": (0.01, 1.0),
+            "courant": (0.01, 1.0),
+            "impact_tolerance": (1e-9, math.inf),
         }
         for name, (low, high) in limits.items():
             with_law = f" with law={self.law!r}" if name == "contact_resolution" else ""
@@ -115,6 +138,25 @@ class Fidelity:
         value = _TOLERANCE if self.tolerance is None else self.tolerance
         value = number("Fidelity.tolerance", value, low=1e-12, high=1.0)
         object.__setattr__(self, "tolerance", value)
+
+    def _check_time_control(self) -> None:
+        """Raises an error if times of impact are asked of a law or geometry that has none."""
+        if self.time_control != "fixed" and self.integrator != "midpoint":
+            raise ValueError(
+                f"Fidelity.time_control {self.time_control!r} requires integrator='midpoint', got "
+                f"{self.integrator!r}: it divides that integrator's steps"
+            )
+        if self.time_control not in _FIND_IMPACTS:
+            return
+        for name, only, why in (
+            ("law", "impulse", "springs resolve a collision over many steps, at no single time"),
+            ("geometry", "shape", "distances between particles aren't bounded along a path"),
+        ):
+            if getattr(self, name) != only:
+                raise ValueError(
+                    f"Fidelity.time_control {self.time_control!r} requires {name}={only!r}, got "
+                    f"{getattr(self, name)!r}: {why}; use 'adaptive' or 'fixed' instead"
+                )
 
     def to_json(self) -> str:
         """The fidelity as JSON text, from which `from_json` builds an equal one."""

@@ -16,7 +16,7 @@ from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames
 from physics.step.readout import make_write_rows
 from physics.step.runge_kutta_step import make_runge_kutta_substep
-from physics.step.substep import make_substep
+from physics.step.time_control import make_controlled_substep, make_end_call
 
 # m, kg m/s or kg m^2/s, in sum: beyond it a dynamic body counts as diverged
 LARGEST = 1e50
@@ -47,7 +47,7 @@ def first_diverged(model, workspace, i):
 @cached_by_features
 def make_write_back(features: Features):
     """Stage that stores lanes into their worlds: diverged ones at once, all after the frame."""
-    write_rows = make_write_rows(features)
+    write_rows, end_call = make_write_rows(features), make_end_call(features)
 
     @stage
     def write_back(model, state, workspace, table, g, elapsed, last):
@@ -59,7 +59,7 @@ def make_write_back(features: Features):
                     w = g * LANES + i
                     store(model, state, workspace, g, i, lane.start[i] + elapsed)
                     write_rows(model, state, w, table)
-                    state.world[w].needs_refresh = 0
+                    state.world[w].needs_refresh = end_call(model, workspace, i)
                     state.world[w].diverged = diverged
                     lane.active[i] = 0
 
@@ -77,7 +77,7 @@ def make_advance(features: Features):
     sources = SOURCES
     constants, forget = make_constants(features), make_forget(features)
     trials = features.integrator == RK4
-    substep = make_runge_kutta_substep(features) if trials else make_substep(features)
+    substep = make_runge_kutta_substep(features) if trials else make_controlled_substep(features)
     write_back = make_write_back(features)
 
     @large_entry

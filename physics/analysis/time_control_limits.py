@@ -1,0 +1,43 @@
+"""Which scenes a time control can advance."""
+
+import numpy as np
+
+from physics.model.features import FIXED, Features
+from physics.model.tables import Model
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Scene
+from physics.scene.shapes import GRID
+
+
+def check_time_control(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
+    """Raises an error if a time control doesn't hold what it promises in a scene.
+
+    Raises:
+        ValueError: divided steps with joints; times of impact with a surface that isn't convex, or
+            with a tolerance at which solids touch before they are candidates for contact.
+    """
+    if features.time_control == FIXED:
+        return
+    problem = f"Fidelity.time_control {fidelity.time_control!r}"
+    if scene.joints:
+        raise ValueError(
+            f"{problem} can't divide the steps of joints, of which the scene has "
+            f"{len(scene.joints)}; use time_control='fixed'"
+        )
+    if not features.finds_impacts:
+        return
+    concave = np.flatnonzero(model.half_pair["kind"] == GRID)
+    if len(concave):
+        name = scene.solid_names[model.half_pair["surface"][concave[0]]]
+        raise ValueError(
+            f"{problem} needs convex surfaces, because their tangents bound the distance; "
+            f"{name} is a mesh: use time_control='adaptive' or 'fixed'"
+        )
+    k = int(np.argmin(model.half_pair["skin"]))
+    largest = 0.5 * float(model.half_pair["skin"][k])
+    if fidelity.impact_tolerance > largest:
+        names = [scene.solid_names[model.half_pair[side][k]] for side in ("owner", "surface")]
+        raise ValueError(
+            f"Fidelity.impact_tolerance {fidelity.impact_tolerance:g} m must be at most "
+            f"{largest:.2g} m, half of the skin between {names[0]} and {names[1]}"
+        )
