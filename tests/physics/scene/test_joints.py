@@ -94,3 +94,10 @@ def test_other_integrators_refuse_joints(integrator):
     scene = Scene([Body(CUBE, mask=0)], joints=[BallJoint(0, None, ORIGIN)])
     with pytest.raises(ValueError, match=r"can't hold joints.*use integrator=\"midpoint\""):
         World(scene, Fidelity(integrator=integrator))
+
+
+def test_divided_steps_refuse_joints():
+    bodies = [Body(CUBE), Body(CUBE, position=(0.5, 0, 0))]
+    scene = Scene(bodies, joints=[BallJoint(0, None, ORIGIN)])
+    with pytest.raises(ValueError, match=r"'adaptive' can't divide the steps of joints"):
+        World(scene, Fidelity(time_control="adaptive"))
