@@ -8,10 +8,12 @@ Source: H. Zhao, "A fast sweeping method for eikonal equations" (2005), for the 
 """
 
 import math
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 from physics.meshes.peeling import PixelGrid, fill, peel
 
@@ -86,49 +88,63 @@ def _nodes_around(corners, t, axis, origin, cell, count):
     return max(first, 0), min(last, count - 1)
 
 
-@entry
-def _near(corners, ox, oy, oz, cell, square, nearest):
-    """Writes squared distance and triangle of the nodes around each triangle."""
-    nx, ny, nz = square.shape
-    for t in range(corners.shape[0]):
-        i0, i1 = _nodes_around(corners, t, 0, ox, cell, nx)
-        j0, j1 = _nodes_around(corners, t, 1, oy, cell, ny)
-        k0, k1 = _nodes_around(corners, t, 2, oz, cell, nz)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
-                for k in range(k0, k1 + 1):
-                    x, y, z = ox + i * cell, oy + j * cell, oz + k * cell
-                    s = triangle_square(corners, t, x, y, z)
-                    if s < square[i, j, k]:
-                        square[i, j, k], nearest[i, j, k] = s, t
+@cache
+def _make_near() -> Any:
+    """Entry point: writes squared distance and triangle of the nodes around each triangle."""
+    sources = SOURCES
+
+    @entry
+    def near(corners, ox, oy, oz, cell, square, nearest):
+        _ = sources
+        nx, ny, nz = square.shape
+        for t in range(corners.shape[0]):
+            i0, i1 = _nodes_around(corners, t, 0, ox, cell, nx)
+            j0, j1 = _nodes_around(corners, t, 1, oy, cell, ny)
+            k0, k1 = _nodes_around(corners, t, 2, oz, cell, nz)
+            for i in range(i0, i1 + 1):
+                for j in range(j0, j1 + 1):
+                    for k in range(k0, k1 + 1):
+                        x, y, z = ox + i * cell, oy + j * cell, oz + k * cell
+                        s = triangle_square(corners, t, x, y, z)
+                        if s < square[i, j, k]:
+                            square[i, j, k], nearest[i, j, k] = s, t
+
+    return near
 
 
-@entry
-def _sweep(corners, ox, oy, oz, cell, square, nearest):
-    """Passes the nearest triangles on, once along each of the eight diagonals."""
-    nx, ny, nz = square.shape
-    for sweep in range(8):
-        dx = 1 if sweep & 1 else -1
-        dy = 1 if sweep & 2 else -1
-        dz = 1 if sweep & 4 else -1
-        for p in range(nx):
-            i = p if dx > 0 else nx - 1 - p
-            for q in range(ny):
-                j = q if dy > 0 else ny - 1 - q
-                for r in range(nz):
-                    k = r if dz > 0 else nz - 1 - r
-                    x, y, z = ox + i * cell, oy + j * cell, oz + k * cell
-                    for n in range(1, 8):  # the seven neighbours behind
-                        a = i - dx if n & 1 else i
-                        b = j - dy if n & 2 else j
-                        c = k - dz if n & 4 else k
-                        if (a < 0) | (a >= nx) | (b < 0) | (b >= ny) | (c < 0) | (c >= nz):
-                            continue
-                        t = nearest[a, b, c]
-                        if t >= 0 and t != nearest[i, j, k]:
-                            s = triangle_square(corners, t, x, y, z)
-                            if s < square[i, j, k]:
-                                square[i, j, k], nearest[i, j, k] = s, t
+@cache
+def _make_sweep() -> Any:
+    """Entry point: passes the nearest triangles on, once along each of the eight diagonals."""
+    sources = SOURCES
+
+    @entry
+    def sweep(corners, ox, oy, oz, cell, square, nearest):
+        _ = sources
+        nx, ny, nz = square.shape
+        for sweep in range(8):
+            dx = 1 if sweep & 1 else -1
+            dy = 1 if sweep & 2 else -1
+            dz = 1 if sweep & 4 else -1
+            for p in range(nx):
+                i = p if dx > 0 else nx - 1 - p
+                for q in range(ny):
+                    j = q if dy > 0 else ny - 1 - q
+                    for r in range(nz):
+                        k = r if dz > 0 else nz - 1 - r
+                        x, y, z = ox + i * cell, oy + j * cell, oz + k * cell
+                        for n in range(1, 8):  # the seven neighbours behind
+                            a = i - dx if n & 1 else i
+                            b = j - dy if n & 2 else j
+                            c = k - dz if n & 4 else k
+                            if (a < 0) | (a >= nx) | (b < 0) | (b >= ny) | (c < 0) | (c >= nz):
+                                continue
+                            t = nearest[a, b, c]
+                            if t >= 0 and t != nearest[i, j, k]:
+                                s = triangle_square(corners, t, x, y, z)
+                                if s < square[i, j, k]:
+                                    square[i, j, k], nearest[i, j, k] = s, t
+
+    return sweep
 
 
 def distance_grid(vertices: Array, faces: Array, cells: int) -> DistanceGrid:
@@ -146,8 +162,8 @@ def distance_grid(vertices: Array, faces: Array, cells: int) -> DistanceGrid:
     corners = np.ascontiguousarray(vertices[faces], dtype=float)
     square, nearest = np.full(tuple(counts), np.inf), np.full(tuple(counts), -1)
     frame = (corners, *map(float, origin), cell, square, nearest)
-    _near(*frame)
-    _sweep(*frame)
+    _make_near()(*frame)
+    _make_sweep()(*frame)
     grid = PixelGrid(2, (origin[0], origin[1]), cell, (int(counts[0]), int(counts[1])))
     rays = int(counts[0] * counts[1])
     inside = fill(peel(vertices, faces, grid), rays, origin[2], cell, int(counts[2]))

@@ -16,10 +16,12 @@ grid of pixels; here all layers are found at once.
 """
 
 import math
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
@@ -63,9 +65,9 @@ def _crossing(ax, ay, bx, by, y):
     return ax + (y - ay) * ((bx - ax) / (by - ay))
 
 
-@entry
-def _rasterise(corners, x0, y0, spacing, columns, rows, cursor, depth, sign, writes):
-    """Counts the crossings of each ray in `cursor` or, if `writes`, writes them from there on.
+@cache
+def _make_rasterise() -> Any:
+    """Entry point: counts the crossings of each ray or, if `writes`, writes them from `cursor` on.
 
     Args:
         corners: [m, 3, 3] m, of the triangles; the rays pass along the third coordinate.
@@ -79,47 +81,54 @@ def _rasterise(corners, x0, y0, spacing, columns, rows, cursor, depth, sign, wri
         sign: [crossings] 1.0 where the ray enters, -1.0 where it leaves.
         writes: whether depths and signs are written.
     """
-    for t in range(corners.shape[0]):
-        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        low, high = min(a[2], min(b[2], c[2])), max(a[2], max(b[2], c[2]))
-        bottom, top = min(a[1], min(b[1], c[1])), max(a[1], max(b[1], c[1]))
-        first = max(0, math.floor((bottom - y0) / spacing) - 1)
-        last = min(rows - 1, math.ceil((top - y0) / spacing) + 1)
-        for j in range(first, last + 1):
-            y = y0 + j * spacing
-            up, down, crosses = 0.0, 0.0, False
-            for e in range(3):
-                p, q = corners[t, e], corners[t, (e + 1) % 3]
-                if (p[1] <= y) != (q[1] <= y):
-                    x, crosses = _crossing(p[0], p[1], q[0], q[1], y), True
-                    if p[1] <= y:
-                        up = x
-                    else:
-                        down = x
-            if not crosses:
-                continue
-            left, right = min(up, down), max(up, down)
-            start = max(0, math.floor((left - x0) / spacing) - 1)
-            end = min(columns - 1, math.ceil((right - x0) / spacing) + 1)
-            for i in range(start, end + 1):
-                x = x0 + i * spacing
-                if (x >= left) & (x < right):
-                    ray = i * rows + j
-                    if writes:
-                        z = 0.5 * (low + high)
-                        if nz != 0.0:
-                            z = a[2] - (nx * (x - a[0]) + ny * (y - a[1])) / nz
-                        depth[cursor[ray]] = min(max(z, low), high)
-                        sign[cursor[ray]] = -1.0 if down <= up else 1.0
-                    cursor[ray] += 1
+    sources = SOURCES
+
+    @entry
+    def rasterise(corners, x0, y0, spacing, columns, rows, cursor, depth, sign, writes):
+        _ = sources
+        for t in range(corners.shape[0]):
+            a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
+            ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+            vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+            nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            low, high = min(a[2], min(b[2], c[2])), max(a[2], max(b[2], c[2]))
+            bottom, top = min(a[1], min(b[1], c[1])), max(a[1], max(b[1], c[1]))
+            first = max(0, math.floor((bottom - y0) / spacing) - 1)
+            last = min(rows - 1, math.ceil((top - y0) / spacing) + 1)
+            for j in range(first, last + 1):
+                y = y0 + j * spacing
+                up, down, crosses = 0.0, 0.0, False
+                for e in range(3):
+                    p, q = corners[t, e], corners[t, (e + 1) % 3]
+                    if (p[1] <= y) != (q[1] <= y):
+                        x, crosses = _crossing(p[0], p[1], q[0], q[1], y), True
+                        if p[1] <= y:
+                            up = x
+                        else:
+                            down = x
+                if not crosses:
+                    continue
+                left, right = min(up, down), max(up, down)
+                start = max(0, math.floor((left - x0) / spacing) - 1)
+                end = min(columns - 1, math.ceil((right - x0) / spacing) + 1)
+                for i in range(start, end + 1):
+                    x = x0 + i * spacing
+                    if (x >= left) & (x < right):
+                        ray = i * rows + j
+                        if writes:
+                            z = 0.5 * (low + high)
+                            if nz != 0.0:
+                                z = a[2] - (nx * (x - a[0]) + ny * (y - a[1])) / nz
+                            depth[cursor[ray]] = min(max(z, low), high)
+                            sign[cursor[ray]] = -1.0 if down <= up else 1.0
+                        cursor[ray] += 1
+
+    return rasterise
 
 
-@entry
-def _pair(first, depth, sign, found):
-    """Sorts the crossings of each ray and pairs them, in place.
+@cache
+def _make_pair() -> Any:
+    """Entry point: sorts the crossings of each ray and pairs them, in place.
 
     Args:
         first: [rays + 1], where the crossings of each ray begin.
@@ -127,25 +136,32 @@ def _pair(first, depth, sign, found):
         sign: [crossings]
         found: [rays], on return the number of intervals of each ray.
     """
-    for ray in range(found.shape[0]):
-        begin, end = first[ray], first[ray + 1]
-        for n in range(begin + 1, end):
-            z, s, m = depth[n], sign[n], n - 1
-            while m >= begin and depth[m] > z:
-                depth[m + 1], sign[m + 1] = depth[m], sign[m]
-                m -= 1
-            depth[m + 1], sign[m + 1] = z, s
-        inside, count, low = 0.0, 0, 0.0
-        for n in range(begin, end):
-            z, before = depth[n], inside
-            inside += sign[n]
-            if before == 0.0 and inside == 1.0:
-                low = z
-            elif before == 1.0 and inside == 0.0 and z > low:
-                depth[begin + 2 * count] = low
-                depth[begin + 2 * count + 1] = z
-                count += 1
-        found[ray] = count
+    sources = SOURCES
+
+    @entry
+    def pair(first, depth, sign, found):
+        _ = sources
+        for ray in range(found.shape[0]):
+            begin, end = first[ray], first[ray + 1]
+            for n in range(begin + 1, end):
+                z, s, m = depth[n], sign[n], n - 1
+                while m >= begin and depth[m] > z:
+                    depth[m + 1], sign[m + 1] = depth[m], sign[m]
+                    m -= 1
+                depth[m + 1], sign[m + 1] = z, s
+            inside, count, low = 0.0, 0, 0.0
+            for n in range(begin, end):
+                z, before = depth[n], inside
+                inside += sign[n]
+                if before == 0.0 and inside == 1.0:
+                    low = z
+                elif before == 1.0 and inside == 0.0 and z > low:
+                    depth[begin + 2 * count] = low
+                    depth[begin + 2 * count + 1] = z
+                    count += 1
+            found[ray] = count
+
+    return pair
 
 
 def peel(vertices: Array, faces: Array, grid: PixelGrid) -> Intervals:
@@ -161,12 +177,12 @@ def peel(vertices: Array, faces: Array, grid: PixelGrid) -> Intervals:
     columns, rows = grid.counts
     frame = (corners, *map(float, grid.origin), float(grid.spacing), int(columns), int(rows))
     cursor = np.zeros(columns * rows, dtype=np.int64)
-    _rasterise(*frame, cursor, np.zeros(0), np.zeros(0), False)
+    _make_rasterise()(*frame, cursor, np.zeros(0), np.zeros(0), False)
     first = np.concatenate([[0], np.cumsum(cursor)])
     depth, sign = np.zeros(first[-1]), np.zeros(first[-1])
-    _rasterise(*frame, first[:-1].copy(), depth, sign, True)
+    _make_rasterise()(*frame, first[:-1].copy(), depth, sign, True)
     found = np.zeros(columns * rows, dtype=np.int64)
-    _pair(first, depth, sign, found)
+    _make_pair()(first, depth, sign, found)
     ray = np.repeat(np.arange(len(found)), found)
     nth = np.arange(len(ray)) - np.repeat(np.cumsum(found) - found, found)
     at = first[ray] + 2 * nth
