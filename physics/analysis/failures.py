@@ -1,6 +1,10 @@
 """The error of worlds whose last steps failed."""
 
+import numpy as np
+
+from physics.analysis.joints import errors as joint_errors
 from physics.analysis.step_limits import cause_of_divergence
+from physics.constraints.projection import FAILED
 from physics.errors import ContactOverflow, SimulationDiverged, StepVanished
 from physics.scene.parameters import with_parameters
 from physics.step.simulation import Simulation
@@ -42,4 +46,14 @@ def _divergence(simulation: Simulation, diverged: list[int]) -> SimulationDiverg
             "raise the tolerance"
         )
         return StepVanished(world, body, name, float(status["time"]), cause, diverged)
+    apart = joint_errors(simulation)[world]
+    if apart.size and np.nanmax(apart, initial=0.0) > FAILED:
+        j = int(np.nanargmax(apart))
+        joint = simulation.scene.joints[j]
+        cause = (
+            f"{joint.name or f'joint {j}'}, a {type(joint).__name__} between {joint.a!r} and "
+            f"{joint.b!r}, came apart by {apart[j]:.2g} m or rad: motion too fast for substeps of "
+            f"{h:.2g} s, or a light body that carries one far heavier; take a smaller "
+            "Fidelity.substep"
+        )
     return SimulationDiverged(world, body, name, float(status["time"]), cause, diverged)

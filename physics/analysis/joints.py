@@ -22,8 +22,7 @@ def velocities(simulation: Simulation) -> Array:
 def errors(simulation: Simulation) -> Array:
     """[count, joints] the largest violation of each joint's constraints, m or rad."""
     dynamic, rows = simulation.state.dynamic, simulation.base.joint_row
-    joints = len(simulation.scene.joints)
-    return pose_errors(rows, joints, dynamic["position"], dynamic["orientation"])
+    return pose_errors(simulation.scene, rows, dynamic["position"], dynamic["orientation"])
 
 
 def _of_free_directions(simulation: Simulation) -> Array:

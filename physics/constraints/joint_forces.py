@@ -31,16 +31,20 @@ from physics.model.tables import ANGLE, EQUALITY, MOTOR
 
 # relative to the lengths that a value is computed from: a limit that is nearer is touched
 TOUCHED = 1e-9
+# of a servo, times the substep: from 1 on it would overshoot
+HIGHEST_SERVO = 0.5
 
 
 @stage
-def _start(model, state, workspace, g):
+def _start(model, state, workspace, g, h):
     """Marks the rows that act and reads the motors' velocities; returns the number with bounds."""
     bounded = 0
     for r in range(model.joint_row.shape[0]):
         row, work = model.joint_row[r], workspace.joint[r]
         bounded += 0 if row.role == EQUALITY else 1
         margin = TOUCHED * row.scale
+        # a motor's velocity is reached within a substep: more than that would overshoot
+        frequency = min(row.frequency, HIGHEST_SERVO / h)
         for i in range(LANES):
             work.force[i] = 0.0
             work.rate[i] = 0.0
@@ -50,10 +54,10 @@ def _start(model, state, workspace, g):
                 rate = 0.0
                 if w < state.motor.shape[0]:
                     rate = state.motor[w, row.motor, 0]
-                    left = state.motor[w, row.motor, 1] - work.value[i]
-                    if row.kind == ANGLE:  # the shorter way
+                    left = state.motor[w, row.motor, 1] - row.middle - work.value[i]
+                    if row.kind == ANGLE and row.limits[1] == math.inf:  # the shorter way
                         left -= 2.0 * math.pi * math.floor(left / (2.0 * math.pi) + 0.5)
-                    rate = row.frequency * left if left == left else rate  # NaN: no servo
+                    rate = frequency * left if left == left else rate  # NaN: no servo
                 rate = max(rate, 0.0) if work.value[i] <= row.limits[0] + margin else rate
                 rate = min(rate, 0.0) if work.value[i] >= row.limits[1] - margin else rate
                 work.rate[i] = rate
@@ -138,7 +142,7 @@ def make_joint_forces(features):
             write_world_frame(workspace)
             linearise_rows(model, workspace)
             convective_rates(model, workspace, drifted)
-            bounded = _start(model, state, workspace, g)
+            bounded = _start(model, state, workspace, g, h)
             for i in range(LANES):
                 lane.joint_unconverged[i] = 1
             for _ in range(bounded + 1):  # each pass but the last bounds a row in every lane left

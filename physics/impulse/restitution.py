@@ -46,12 +46,14 @@ MAX_SWEEPS = 64
 def make_find_impacts(features):
     """Stage that notes the restitution of each colliding point of a half-pair, -1 of others.
 
-    It also notes which lanes have any.
+    It also notes which lanes have any. A motor that presses a body at rest onto another gives it,
+    in half a substep, a velocity that looks like an impact; so with joints only points collide that
+    did so with the velocities of half a substep ago, too.
     """
-    timed = features.finds_impacts
+    timed, joints = features.finds_impacts, features.joints
 
     @stage
-    def find_impacts(workspace, k, pair, constants, h):
+    def find_impacts(workspace, k, pair, constants, h, lags):
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
         restitution, floors = constants.restitution, constants.rest_speed
         lane = workspace.lane[0]
@@ -69,6 +71,8 @@ def make_find_impacts(features):
                 else:
                     touches = point.separation[i] + 0.5 * h * un <= TOUCH_TOLERANCE
                 collides = (un < -floor) & touches & (point.weight[i] > 0.0)
+                if joints:
+                    collides = collides & (lags | (point.impact_restitution[i] >= 0.0))
                 point.impact_restitution[i] = e if collides else -1.0
                 point.normal_impact[i] = 0.0
                 for axis in range(3):
@@ -216,10 +220,34 @@ def make_apply_impacts(features):
 
 
 @cached_by_features
+def make_find_all_impacts(features):
+    """Stage that notes the colliding points of all half-pairs and the lanes that have any."""
+    find_impacts = make_find_impacts(features)
+
+    @stage
+    def find_all_impacts(model, workspace, h, lags):
+        """Number of lanes with a collision; `lags`: with velocities of half a substep ago."""
+        lane, lanes = workspace.lane[0], 0
+        for i in range(LANES):
+            lane.colliding[i] = 0
+            lane.fastest_approach[i] = 0.0
+            lane.impact_restitution[i] = 0.0
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                pair = operands_of(model, workspace, k)
+                find_impacts(workspace, k, pair, model.half_pair[k], h, lags)
+        for i in range(LANES):
+            lanes += lane.colliding[i]
+        return lanes
+
+    return find_all_impacts
+
+
+@cached_by_features
 def make_impacts(features):
     """Stage that lets contacts collide, in the worlds in which any do."""
     impact_sweep, apply_impacts = make_impact_sweep(features), make_apply_impacts(features)
-    find_impacts = make_find_impacts(features)
+    find_all_impacts = make_find_all_impacts(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
@@ -278,31 +306,15 @@ def make_impacts(features):
         apply_impacts(model, workspace, refresh)
         end_hold(model, workspace, h if refresh else 0.0)
 
-    @stage
-    def find_all_impacts(model, workspace, h):
-        """Number of lanes with a collision."""
-        lane, lanes = workspace.lane[0], 0
-        for i in range(LANES):
-            lane.colliding[i] = 0
-            lane.fastest_approach[i] = 0.0
-            lane.impact_restitution[i] = 0.0
-        for k in range(model.half_pair.shape[0]):
-            if workspace.half_pair[k].slots > 0:
-                pair = operands_of(model, workspace, k)
-                find_impacts(workspace, k, pair, model.half_pair[k], h)
-        for i in range(LANES):
-            lanes += lane.colliding[i]
-        return lanes
-
     @sequence
     def impacts(model, workspace, h, refresh):
-        if find_all_impacts(model, workspace, h) == 0:
+        if find_all_impacts(model, workspace, h, False) == 0:
             return
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
                 remove_push_out(operands_of(model, workspace, k), workspace.lane[0].colliding)
         couple_finger_velocities(model, workspace)
-        if find_all_impacts(model, workspace, h) > 0:
+        if find_all_impacts(model, workspace, h, False) > 0:
             collide(model, workspace, h, refresh)
 
     return impacts

@@ -30,7 +30,7 @@ from physics.impulse.point_impulses import (
     operands_of,
     rotate_inertia,
 )
-from physics.impulse.restitution import make_impacts
+from physics.impulse.restitution import make_find_all_impacts, make_impacts
 from physics.impulse.sweep import make_sweep
 from physics.model.contact_memory import contact_memory
 from physics.model.features import EULER, cached_by_features
@@ -172,7 +172,8 @@ def make_impulses(features):
     """Stage that adds the contact forces of all half-pairs, and records contacts."""
     contact_rows, impacts = make_contact_rows(features), make_impacts(features)
     sweep, warm_start = make_sweep(features), make_warm_start(features)
-    store_forces = make_store_forces(features)
+    store_forces, find_all_impacts = make_store_forces(features), make_find_all_impacts(features)
+    joints = features.joints
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
@@ -221,6 +222,8 @@ def make_impulses(features):
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
                 contact_rows(model, state, workspace, g, k, workspace.lane[0].updates_memory, h)
+        if joints:
+            find_all_impacts(model, workspace, h, True)
         # velocities are half a step old; bodies collide with the present ones
         apply_known_forces(model, workspace, lag * drifted)
         impacts(model, workspace, h, drifted == 0.0)

@@ -4,8 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.model.joints import held_axes
 from physics.model.tables import ALONG, ANGLE, DISTANCE, EQUALITY
-from physics.rotation import rotate
+from physics.rotation import rotate, rotate_back
+from physics.scene.drives import Drive
+from physics.scene.scene import Scene
+from physics.scene.solids import Body
 
 Array = np.ndarray
 
@@ -38,9 +42,10 @@ def frame_of(
     return Frame(zero, np.broadcast_to([0.0, 0.0, 0.0, 1.0], (n, 4)), zero, zero)
 
 
-def pose_errors(joint_row: Array, joints: int, position: Array, orientation: Array) -> Array:
-    """[n, joints] the largest violation of each joint by poses [n, bodies, ...], m or rad."""
-    largest, still = np.zeros((len(position), joints)), np.zeros_like(position)
+def pose_errors(scene: Scene, joint_row: Array, position: Array, orientation: Array) -> Array:
+    """[n, joints] the largest violation of each joint by poses [n, solids, ...], m or rad."""
+    n = len(position)
+    largest, still = np.zeros((n, len(scene.joints))), np.zeros_like(position)
     for row in joint_row:
         if row["role"] == EQUALITY:
             ends = [
@@ -48,6 +53,17 @@ def pose_errors(joint_row: Array, joints: int, position: Array, orientation: Arr
             ]
             violation, j = np.abs(measure(row, *ends)[0] - row["target"]), int(row["joint"])
             largest[:, j] = np.maximum(largest[:, j], violation)
+    # perpendicular axes stay so if one of them is reversed
+    solids: tuple[Body | Drive, ...] = (*scene.bodies, *scene.driven_bodies)
+    for j, *of_joint, directions in held_axes(scene):
+        now = [np.broadcast_to(directions, (n, *directions.shape))] * 2
+        for e, end in enumerate(of_joint):
+            if end is not None:
+                fixed = rotate_back(np.array(solids[end].orientation), directions)
+                now[e] = rotate(orientation[:, end, None], fixed[None])
+        sine = np.linalg.norm(np.cross(now[0], now[1]), axis=-1)
+        angle = np.arctan2(sine, (now[0] * now[1]).sum(-1))
+        largest[:, j] = np.maximum(largest[:, j], angle.max(axis=1))
     return largest
 
 

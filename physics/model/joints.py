@@ -32,8 +32,13 @@ Array = np.ndarray
 def joint_rows(scene: Scene, world: int) -> Array:
     """Rows of JOINT_ROW; `world` is the row of Workspace.solid that stands for the world."""
     rows: list[Any] = []
+    last: list[Any] = []
+    looped = _joints_in_loops(scene)
     for j in _order(scene):
-        rows += _Rows(scene, j, world).found
+        for row in _Rows(scene, j, world).found:
+            # in a closed loop a motor may depend on other joints; then it is the one left out
+            (last if j in looped and row["role"] != EQUALITY else rows).append(row)
+    rows += last
     table = np.array(rows, dtype=JOINT_ROW)
     entries = 0
     for r in range(len(table)):
@@ -86,6 +91,39 @@ def _order(scene: Scene) -> list[int]:
             queue += new
         order += queue
     return order[::-1]
+
+
+def _direction(axis: Any) -> Array:
+    """Unit vector along an axis of any length."""
+    scaled = np.array(axis) / np.abs(axis).max()  # squares of its entries may be beyond doubles
+    return scaled / np.linalg.norm(scaled)
+
+
+def _joints_in_loops(scene: Scene) -> set[int]:
+    """Indices of all joints of those groups of bodies in which joints form closed loops."""
+    group: dict[int | None, int] = {}  # of each body; None stands for the world and for drives
+    looped: set[int] = set()
+    for joint in scene.joints:
+        one, other = scene.joint_ends(joint)
+        if other is not None and other >= len(scene.bodies):
+            other = None
+        a, b = (group.setdefault(end, len(group)) for end in (one, other))
+        if a == b or b in looped:
+            looped.add(a)
+        group = {end: a if g == b else g for end, g in group.items()}
+    ends = (scene.joint_ends(joint)[0] for joint in scene.joints)
+    return {j for j, a in enumerate(ends) if group[a] in looped}
+
+
+def held_axes(scene: Scene) -> list[tuple[int, int, int | None, Array]]:
+    """Joint, ends, and directions [k, 3] of the world frame that both ends keep in common."""
+    found: list[tuple[int, int, int | None, Array]] = []
+    for j, joint in enumerate(scene.joints):
+        if isinstance(joint, Hinge):
+            found.append((j, *scene.joint_ends(joint), _direction(joint.axis)[None]))
+        elif isinstance(joint, Slider | Weld):
+            found.append((j, *scene.joint_ends(joint), np.eye(3)))
+    return found
 
 
 def _pose(scene: Scene, solid: int | None) -> tuple[Array, Array]:
@@ -156,7 +194,7 @@ class _Rows:
             self._anchors(one, other)
             self._add(DISTANCE, target=np.linalg.norm(one - other))
         else:
-            n = np.array(joint.axis) / np.linalg.norm(joint.axis)
+            n = _direction(joint.axis)
             s = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
             s /= np.linalg.norm(s)
             t = np.cross(n, s)
@@ -176,15 +214,31 @@ class _Rows:
                 )
 
     def _free(self, joint: Hinge | Slider, kind: int, **values: Any) -> None:
-        """Rows for the limits and the motor along the direction that a joint leaves free."""
+        """Rows for the limits and the motor along the direction that a joint leaves free.
+
+        They count the angle of a hinge with limits from the middle of its range, and so only wrap
+        half a turn away from there.
+        """
         self._add(kind, MOTOR, **values)
         self.free = self.found.pop()
-        limits = joint.limits or (-np.inf, np.inf)
+        low, high = joint.limits or (-np.inf, np.inf)
+        middle = 0.0
+        if kind == ANGLE and joint.limits is not None:
+            middle = 0.5 * (low + high)
+            axis = self.rotation_b.T @ _direction(joint.axis)
+            turned = self.rotation_b @ _turned(values["axis_b"], axis, -middle)
+            values = values | {"axis_a": self.rotation_a.T @ turned}
+        low, high = low - middle, high - middle
         if joint.motor is not None:  # before the limits, on which it would depend
-            values_of_motor = {"motor": self.motor, "limits": limits}
+            values_of_motor = {"motor": self.motor, "limits": (low, high), "middle": middle}
             for name in ("force_limit", "frequency"):
                 values_of_motor[name] = getattr(joint.motor, name)
             self._add(kind, MOTOR, **values, **values_of_motor)
-        if joint.limits is not None:
-            self._add(kind, LOW_LIMIT, target=limits[0], **values)
-            self._add(kind, HIGH_LIMIT, target=limits[1], **values)
+        for role, limit in ((LOW_LIMIT, low), (HIGH_LIMIT, high)):
+            if np.isfinite(limit):
+                self._add(kind, role, target=limit, **values)
+
+
+def _turned(vector: Array, axis: Array, angle: float) -> Array:
+    """A vector perpendicular to a unit axis, rotated about it by an angle in rad."""
+    return np.cos(angle) * vector + np.sin(angle) * np.cross(axis, vector)

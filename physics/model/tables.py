@@ -203,7 +203,8 @@ JOINT_ROW = np.dtype(
         ("force_limit", "f8"),  # N or N m, of a motor
         ("frequency", "f8"),  # 1/s, of a servo
         ("motor", "i8"),  # index in State.motor, or -1
-        ("limits", "f8", (2,)),  # rad or m, of a motor's joint
+        ("middle", "f8"),  # rad, of a motor: the position at which its row's value is zero
+        ("limits", "f8", (2,)),  # rad or m, of a motor's joint, from there
         ("first", "i8"),  # first row that it is coupled to, and from there on
         ("entry", "i8"),  # of that row, in Workspace.joint_factor
     ],

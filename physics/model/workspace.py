@@ -125,6 +125,9 @@ LANE = np.dtype(
         ("updates_memory", "i8", (LANES,)),  # 0: inactive, or a refresh of other lanes passes by
         ("start", "f8", (LANES,)),  # s, time at which this call began
         ("joint_unconverged", "i8", (LANES,)),  # 1: joints need another pass
+        ("joint_residual", "f8", (LANES,)),  # largest violation, relative
+        ("joint_before", "f8", (LANES,)),  # that of the iteration before
+        ("joint_stuck", "i8", (LANES,)),  # 1: the iteration doesn't converge
         ("joint_beyond", "i8", (LANES,)),  # 1: a motor or limit is beyond its bound
         ("in_contact", "i8", (LANES,)),  # 1: has candidates; impulse law
         # of instantaneous collisions, see impulse/restitution.py
@@ -198,8 +201,16 @@ JOINT_WORK = np.dtype(
     align=True,
 )
 
-# one row per dynamic body: the pose at the start of a drift
-POSE = np.dtype([("position", "f8", (3, LANES)), ("orientation", "f8", (4, LANES))], align=True)
+# one row per dynamic body: its state at the start of a drift
+START = np.dtype(
+    [
+        ("position", "f8", (3, LANES)),
+        ("orientation", "f8", (4, LANES)),
+        ("momentum", "f8", (3, LANES)),
+        ("angular_momentum", "f8", (3, LANES)),
+    ],
+    align=True,
+)
 
 
 # one row per half-pair, of time control, see step/event_steps.py
@@ -258,7 +269,7 @@ class Workspace(NamedTuple):
         manifold: [two longest lists] of MANIFOLD_POINT; impulse law.
         joint: [rows of joints] of JOINT_WORK.
         joint_factor: [entries, LANES] off the diagonal, see constraints/envelope.py.
-        start_pose: [dynamic bodies] of POSE; with joints.
+        start: [dynamic bodies] of START; with joints.
         trial: [dynamic bodies] of TRIAL; Runge-Kutta methods.
         pace: [1] of LANE_PACE; Runge-Kutta methods.
         timing: [half-pairs] of TIMING; time control.
@@ -277,7 +288,7 @@ class Workspace(NamedTuple):
     manifold: Array
     joint: Array
     joint_factor: Array
-    start_pose: Array
+    start: Array
     trial: Array
     pace: Array
     timing: Array
@@ -307,7 +318,7 @@ class Workspace(NamedTuple):
             manifold=np.zeros(2 * longest if impulse else 0, MANIFOLD_POINT),
             joint=aligned_zeros(len(rows), JOINT_WORK),
             joint_factor=aligned_zeros((entries, LANES), np.dtype(float)),
-            start_pose=aligned_zeros(joints * len(model.dynamic), POSE),
+            start=aligned_zeros(joints * len(model.dynamic), START),
             trial=aligned_zeros(len(model.dynamic) if trials else 0, TRIAL),
             pace=aligned_zeros(1 if trials else 0, LANE_PACE),
             timing=aligned_zeros(len(half_pair) if kept else 0, TIMING),

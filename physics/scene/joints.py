@@ -13,6 +13,10 @@ from typing import Any
 from physics.scene.fields import BodyName, check_body
 from physics.scene.validation import Vector, instance, number, positive, vector
 
+# rad, of a hinge's limits: a body that passes one by less than half of what is left of a full turn
+# is pushed back
+_WIDEST_RANGE = 2.0 * math.pi - 0.5
+
 
 @dataclass(frozen=True)
 class Motor:
@@ -24,8 +28,8 @@ class Motor:
             zero the motor is a brake. `World.command_motors` changes it.
         position: rad or m, set point of a servo; None: none, the velocity counts. A servo drives
             with `frequency` times the distance to its set point. `World.move_motors` changes it.
-        frequency: 1/s, above zero. A servo whose force is too small to stop in 1/frequency s
-            overshoots.
+        frequency: 1/s, above zero; beyond half of 1/substep it counts as that. A servo whose force
+            is too small to stop in 1/frequency s overshoots.
 
     Raises:
         TypeError, ValueError: a field is of the wrong type, not finite or not above zero; both a
@@ -86,8 +90,8 @@ class Hinge:
         b: another body or a drive, by index or name; None: the world.
         anchor: a point of the axis, world frame, m.
         axis: its direction, world frame; any length above zero.
-        limits: (low, high) of the angle of `a` relative to `b`, rad, from -pi to pi; zero, the
-            angle in the scene, lies between them. None: no limits.
+        limits: (low, high) of the angle of `a` relative to `b`, rad, within -pi to pi and at most
+            2 pi - 0.5 apart; zero, the angle in the scene, lies between them. None: no limits.
         motor: drives the angle.
         collide: whether the two solids can touch each other.
         name: for error messages; None: "joint" and its index.
@@ -234,6 +238,11 @@ def _check(joint: Any, most: float = math.inf) -> None:
             raise ValueError(
                 f"{kind}.limits must be (low, high){bounds} with low <= 0 <= high and low < high: "
                 f"the scene's pose is at 0; got {limits!r}"
+            )
+        if most < math.inf and high - low > _WIDEST_RANGE:
+            raise ValueError(
+                f"{kind}.limits must span at most {_WIDEST_RANGE:.6g} rad, got {limits!r}: nearer "
+                "to a full turn a body could jump from one limit to the other; None: no limits"
             )
         object.__setattr__(joint, "limits", (low, high))
     if getattr(joint, "motor", None) is not None:

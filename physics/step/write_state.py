@@ -122,9 +122,9 @@ def _check_joints(simulation: Simulation, new: Mapping[str, Array], worlds: Arra
     ):
         if name in new:
             poses[field][:, first : first + new[name].shape[1]] = new[name]
-    errors = pose_errors(
-        simulation.base.joint_row, len(joints), poses["position"], poses["orientation"]
-    )
+    rows = simulation.base.joint_row
+    errors = pose_errors(simulation.scene, rows, poses["position"], poses["orientation"])
+    errors = np.nan_to_num(errors, nan=np.inf)  # of poses that overflow
     n, j = divmod(int(np.argmax(errors)), len(joints))
     if errors[n, j] > JOINT_TOLERANCE:
         name = joints[j].name or f"joint {j}"

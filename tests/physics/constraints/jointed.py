@@ -18,12 +18,12 @@ def about_y(angle):
     return (0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle))
 
 
-def pendulum(amplitude, fidelity="accurate", count=1, **hinge):
+def pendulum(amplitude, fidelity="accurate", count=1, gravity=(0.0, 0.0, -9.81), **hinge):
     """A rod of 0.5 m on a hinge at its upper end, deflected by an angle in rad."""
     centre = (0.25 * math.sin(amplitude), 0.0, -0.25 * math.cos(amplitude))
     body = ghost(position=centre, orientation=about_y(-amplitude))
     joint = Hinge(0, None, (0, 0, 0), (0, -1, 0), **hinge)
-    return World(Scene([body], joints=[joint]), fidelity, count)
+    return World(Scene([body], joints=[joint], gravity=gravity), fidelity, count)
 
 
 def pendulum_inertia():
@@ -34,3 +34,30 @@ def pendulum_inertia():
 def energy(world):
     """[count] J."""
     return world.kinetic_energy() + world.potential_energy()
+
+
+def linkage(corners, masses=None, gravity=(0.0, 0.0, -9.81), fidelity="balanced", motors=None):
+    """Bars in a closed loop, on hinges about y at `corners` in x and z; both ends on the world.
+
+    Args:
+        corners: [bars + 1] of (x, z) in m.
+        masses: kg of each bar; None: 1 each.
+        gravity: m/s^2.
+        fidelity: of the world.
+        motors: Motor of the joint at each corner's index.
+    """
+    bars, motors = len(corners) - 1, motors or {}
+    bodies, joints = [], []
+    for i in range(bars):
+        (x, z), (u, w) = corners[i], corners[i + 1]
+        bar = Box((0.01, 0.01, 0.5 * math.hypot(u - x, w - z)))
+        pose = {
+            "position": (0.5 * (x + u), 0.0, 0.5 * (z + w)),
+            "orientation": about_y(math.atan2(u - x, w - z)),
+        }
+        bodies.append(ghost(bar, 1.0 if masses is None else masses[i], **pose))
+    ends = [(0, None), *((i, i - 1) for i in range(1, bars)), (bars - 1, None)]
+    for i, (a, b) in enumerate(ends):
+        x, z = corners[i]
+        joints.append(Hinge(a, b, (x, 0, z), (0, 1, 0), motor=motors.get(i)))
+    return World(Scene(bodies, joints=joints, gravity=gravity), fidelity)

@@ -15,6 +15,7 @@ from tests.physics.constraints.jointed import (
     about_y,
     energy,
     ghost,
+    linkage,
     pendulum,
     pendulum_inertia,
 )
@@ -110,18 +111,7 @@ def test_a_double_pendulum_keeps_its_energy_for_a_minute():
 
 def test_a_four_bar_linkage_stays_closed():
     """Four hinges hold three bars with three rows too many; those are left out."""
-    corners = [(0.0, 0.0), (-0.1, 0.3), (0.35, 0.45), (0.4, 0.0)]
-    bodies, joints = [], []
-    for i in range(3):
-        (x, z), (u, w) = corners[i], corners[i + 1]
-        length = math.hypot(u - x, w - z)
-        turn = about_y(math.atan2(u - x, w - z))
-        bodies.append(ghost(Box((0.01, 0.01, 0.5 * length)), 0.5 + 0.2 * i,
-                            position=((x + u) / 2, 0, (z + w) / 2), orientation=turn))  # fmt: skip
-    for i, (a, b) in enumerate([(0, None), (1, 0), (2, 1), (2, None)]):
-        x, z = corners[i]
-        joints.append(Hinge(a, b, (x, 0, z), (0, 1, 0)))
-    world = World(Scene(bodies, joints=joints), "balanced")
+    world = linkage([(0.0, 0.0), (-0.1, 0.3), (0.35, 0.45), (0.4, 0.0)], (0.5, 0.7, 0.9))
     before, scale = float(energy(world)[0]), 2.1 * G * 0.3
     angles = []
     for _ in range(500):

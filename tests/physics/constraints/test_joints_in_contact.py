@@ -64,6 +64,20 @@ def test_a_press_loads_the_ground_with_weights_and_motor(fidelity):
 
 
 @LAWS
+def test_a_motor_presses_an_arm_onto_the_ground(fidelity):
+    """The motor accelerates it faster than gravity does: that is no impact, substep by substep."""
+    arm = Body(Box((0.2, 0.03, 0.02)), mass=1.0, position=(0.2, 0, 0.0225))
+    joint = Hinge(0, None, (0, 0, 0.0225), (0, 1, 0), motor=Motor(20.0, 3.0))
+    world = world_of([arm], [joint], fidelity)
+    world.advance(1.0)
+    loads = []
+    for _ in range(20):
+        world.advance(0.004)
+        loads.append(float(world.normal_force("body 0", "static 0")[0]))
+    assert np.mean(loads) == pytest.approx(20.0 / 0.4 + 9.81 / 2, rel=0.06)  # the sink tilts it
+
+
+@LAWS
 def test_a_limit_supports_what_lies_on_the_limb(fidelity):
     """A flap on a hinge rests on its limit; the cube on it stays, as on a shelf."""
     flap = Body(Box((0.1, 0.1, 0.02)), mass=0.5, position=(0.12, 0, 0.5))

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from physics import Box, Drive, Fidelity, Hinge, Motor, Scene, Slider, World
+from physics.rotation import rotate_back
 from tests.physics.constraints.jointed import (
     MASS,
     energy,
     ghost,
+    linkage,
     pendulum,
     pendulum_inertia,
 )
@@ -137,3 +139,55 @@ def test_a_body_on_a_drive_turns_with_a_limited_torque():
     assert world.joint_error().max() < 1e-12
     with pytest.raises(ValueError, match="violate joint 0, a Hinge between 0 and 'carriage'"):
         world.set_state(drive_position=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "spin", "end"), [((-1.0, 3.1), 160.0, 3.1), ((-2.8, 2.9), -400.0, -2.8)]
+)
+def test_a_limit_near_half_a_turn_stops_a_fast_body(limits, spin, end):
+    """In a substep it passes the angle pi, where the angle jumps by a full turn."""
+    world = pendulum(0.0, "balanced", gravity=(0, 0, 0), limits=limits)
+    world.set_state(linear_velocity=(0.25 * spin, 0, 0), angular_velocity=(0, -spin, 0))
+    world.advance(0.1)
+    assert float(world.joint_position()[0, 0]) == pytest.approx(end, abs=1e-9)
+    assert float(world.kinetic_energy()[0]) < 1e-12
+
+
+def test_a_servo_between_limits_takes_the_way_that_is_free():
+    motor = Motor(50.0, position=-2.9)
+    world = pendulum(0.0, "balanced", limits=(-3.0, 2.7), motor=motor)
+    world.advance(1.0)
+    assert float(world.joint_position()[0, 0]) == pytest.approx(-2.9, abs=1e-3)
+    world.move_motors(2.6)  # across pi it would be nearer
+    world.advance(3.0)
+    assert float(world.joint_position()[0, 0]) == pytest.approx(2.6, abs=1e-3)
+
+
+@pytest.mark.parametrize("frequency", [300.0, 1e6])
+def test_a_servo_faster_than_the_substep_does_not_overshoot(frequency):
+    motor = Motor(5000.0, position=1.0, frequency=frequency)
+    world = pendulum(0.0, "balanced", motor=motor)
+    for _ in range(50):
+        world.advance(0.002)
+        assert float(world.joint_position()[0, 0]) < 1.0 + 1e-3
+    assert float(world.joint_position()[0, 0]) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("driven", [(0, 1), (0, 3), (0, 1, 2)])
+def test_motors_that_contradict_each_other_do_not_open_a_linkage(driven):
+    """Four bars have one motion; a motor that depends on the others is left out."""
+    corners = [(0.0, 0.0), (-0.1, 0.3), (0.35, 0.45), (0.4, 0.0)]
+    world = linkage(corners, motors={i: Motor(500.0, 1.0) for i in driven})
+    for _ in range(20):
+        world.advance(0.01)
+        assert world.joint_error().max() < 1e-9
+    for i, (a, b) in enumerate([(0, None), (1, 0), (2, 1), (2, None)]):
+        anchor, rates = np.array(world.scene.joints[i].anchor), []
+        for end in (a, b):
+            if end is None:
+                rates.append(np.zeros(3))
+                continue
+            body = world.scene.bodies[end]
+            point = rotate_back(np.array(body.orientation), anchor - np.array(body.position))
+            rates.append(world.point_velocity(end, point)[0])
+        assert np.abs(rates[0] - rates[1]).max() < 1e-9

@@ -17,6 +17,7 @@ from physics import (
     Weld,
     World,
 )
+from tests.physics.constraints.jointed import ghost
 
 CUBE = Box((0.05, 0.05, 0.05))
 ORIGIN = (0.0, 0.0, 0.0)
@@ -31,6 +32,7 @@ ORIGIN = (0.0, 0.0, 0.0)
         (lambda: Hinge(0, None, ORIGIN, ORIGIN), r"Hinge.axis must have a length above zero"),
         (lambda: Hinge(0, None, ORIGIN, limits=(0.1, 1.0)), r"Hinge.limits .* got \(0.1, 1.0\)"),
         (lambda: Hinge(0, None, ORIGIN, limits=(-4.0, 1.0)), r"within -3.14159 to 3.14159"),
+        (lambda: Hinge(0, None, ORIGIN, limits=(-3.1, 3.1)), r"must span at most 5.78319 rad"),
         (lambda: Hinge(0, None, ORIGIN, limits=(1.0,)), r"Hinge.limits must be 2 numbers, got"),
         (lambda: Hinge(0, None, ORIGIN, motor=3.0), r"Hinge.motor must be Motor, got 3.0"),
         (lambda: Hinge(1.5, None, ORIGIN), r"Hinge.a must be the index or the name of a body"),
@@ -101,3 +103,20 @@ def test_divided_steps_refuse_joints():
     scene = Scene(bodies, joints=[BallJoint(0, None, ORIGIN)])
     with pytest.raises(ValueError, match=r"'adaptive' can't divide the steps of joints"):
         World(scene, Fidelity(time_control="adaptive"))
+
+
+@pytest.mark.parametrize(
+    "joint", [Weld(0, 1), Hinge(0, 1, (0.25, 0, 0), (0, 1, 0)), Slider(0, 1, (1, 0, 0))]
+)
+def test_a_pose_turned_by_half_a_turn_violates_a_joint(joint):
+    """Axes that must be perpendicular are so after it, too."""
+    bodies = [ghost(), ghost(position=(0.5, 0, 0))]
+    world = World(Scene(bodies, joints=[joint]))
+    with pytest.raises(ValueError, match=r"they violate joint 0, .* by 3\.14"):
+        world.set_state(orientation=[(1, 0, 0, 0), (0, 0, 0, 1)])
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_an_axis_may_have_any_length(size):
+    joint = Hinge(0, None, (0, 0, 0), (0, size, 0))
+    assert World(Scene([ghost()], joints=[joint])).joint_error().max() < 1e-15
