@@ -247,3 +247,15 @@ def test_forces_of_a_joint_are_those_of_the_moving_pendulum():
             world.angular_acceleration[0, 0], (0, -turning, 0), atol=tolerance
         )
         world.advance(0.2)
+
+
+def test_wrenches_turn_a_hinged_body_about_its_hinge():
+    """A torque, and a force at its lower end across the arm, give it torque/inertia."""
+    inertia, end = pendulum_inertia(), (0.0, 0.0, -0.5)
+    for wrench in ({"torque": (0, -0.2, 0)}, {"force": (0.4, 0, 0), "point": end}):
+        world = pendulum(0.0, gravity=(0, 0, 0))
+        world.apply_wrench(body=0, **wrench)
+        world.advance(0.02)
+        rate = 0.2 * 0.02 / inertia
+        assert float(world.joint_velocity()[0, 0]) == pytest.approx(rate, rel=1e-5)
+        assert world.joint_error().max() < 1e-13
