@@ -72,7 +72,9 @@ def test_a_wrench_gives_its_impulse_exactly(integrator):
     assert not world.force().any()
 
 
-def test_a_ball_without_rotation_flies_along_a_parabola():
+def test_a_ball_without_rotation_flies_along_a_parabola(stress):
+    if not stress:
+        pytest.skip("a kernel of its own for ten seconds; see make stress")
     ball = Body(Sphere(0.1), mass=1.0, linear_velocity=(1.0, 0.0, 5.0))
     world = World(Scene([ball]), Fidelity(integrator="adaptive", substep=0.3))
     world.advance(1.0)
@@ -80,7 +82,9 @@ def test_a_ball_without_rotation_flies_along_a_parabola():
     assert world.steps[0] < 20
 
 
-def test_a_spinning_ball_turns_by_its_spin():
+def test_a_spinning_ball_turns_by_its_spin(stress):
+    if not stress:
+        pytest.skip("a kernel of its own for ten seconds; see make stress")
     ball = Body(Sphere(0.1), mass=1.0, angular_velocity=(0.0, 0.0, 2.0))
     world = World(Scene([ball]), Fidelity(integrator="rk4", substep=0.01))
     world.advance(1.0)
