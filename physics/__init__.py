@@ -4,6 +4,7 @@ from physics.analysis.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged, StepVanished
 from physics.model.features import Features
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.fields import Attractor, Drag, PointSpring
@@ -12,9 +13,11 @@ from physics.scene.material import Material
 from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
 from physics.scene.part import Part
+from physics.scene.particles import Particles
 from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
+from physics.scene.torus import Torus
 from physics.step.readout import Readout
 from physics.world import Snapshot, World
 
@@ -28,6 +31,7 @@ __all__ = [
     "Compound",
     "ContactOverflow",
     "Contacts",
+    "Cylinder",
     "Distance",
     "Drag",
     "Drive",
@@ -41,6 +45,7 @@ __all__ = [
     "Motor",
     "Parameters",
     "Part",
+    "Particles",
     "PointSpring",
     "Readout",
     "Scene",
@@ -50,6 +55,7 @@ __all__ = [
     "Sphere",
     "Static",
     "StepVanished",
+    "Torus",
     "Weld",
     "World",
 ]

@@ -9,6 +9,7 @@ import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.collision.distances import core_distance
+from physics.collision.facing import facing
 from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
@@ -69,13 +70,14 @@ def make_add_candidate(features):
 def make_list_samples(features):
     """Stage that fills the list of a half-pair in one lane."""
     impulse, particles = features.impulse, features.particles
-    per_world_parameters = features.per_world_parameters
+    per_world_parameters, axial = features.per_world_parameters, features.axial
     add_candidate = make_add_candidate(features)
     grid = features.grid
     separations = make_separations(features)
     distance = by_surface_kind(
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
     )
+    turn = by_surface_kind(features, lambda kind: None if kind == PARTICLES else facing(kind))
 
     @stage
     def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):
@@ -119,9 +121,14 @@ def make_list_samples(features):
             if per_world_parameters:
                 size = at(half_pair.owner_size, i)
                 sx, sy, sz = size * sx, size * sy, size * sz
-            x = R[0, i] * sx + R[1, i] * sy + R[2, i] * sz + c[0, i]
-            y = R[3, i] * sx + R[4, i] * sy + R[5, i] * sz + c[1, i]
-            z = R[6, i] * sx + R[7, i] * sy + R[8, i] * sz + c[2, i] - height
+            tx, ty = sx, sy
+            if axial and impulse and half_pair.axial != 0:
+                core = half_pair.core
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                tx, ty = turn(half_pair.kind, sx, sy, sz, R, c, i, ca, cb, cc)
+            x = R[0, i] * tx + R[1, i] * ty + R[2, i] * sz + c[0, i]
+            y = R[3, i] * tx + R[4, i] * ty + R[5, i] * sz + c[1, i]
+            z = R[6, i] * tx + R[7, i] * ty + R[8, i] * sz + c[2, i] - height
             if pairs:
                 for j in range(half_pair.partner_count):
                     p = model.sample[:, half_pair.first_partner + j]

@@ -9,11 +9,18 @@ Grounds, statics and drives never rotate, so their arm doesn't matter, and only 
 
 import math
 
-from physics.collision.distances import box_distance, capsule_distance, sphere_distance
+from physics.collision.distances import (
+    box_distance,
+    capsule_distance,
+    cylinder_distance,
+    sphere_distance,
+    torus_distance,
+)
+from physics.collision.facing import facing
 from physics.compiler.jit import stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE
+from physics.scene.shapes import BOX, CAPSULE, CYLINDER, GRID, PARTICLES, PLANE, TORUS
 
 # m: samples that come within this distance count as touching, so that a face that arrives just then
 # does not touch with some of its corners only, chosen by round-off
@@ -28,10 +35,12 @@ def make_touch(features, kind):
     plane, particles, box = kind == PLANE, kind == PARTICLES, kind == BOX
     grid = kind == GRID
     compound, remembered_face = features.compound, contact_memory(features).face
-    surface_distance = capsule_distance if kind == CAPSULE else sphere_distance
+    cylinder = kind == CYLINDER
+    surface_distance = {CAPSULE: capsule_distance, TORUS: torus_distance}.get(kind, sphere_distance)
+    turn, turns = facing(kind), features.axial and kind != PARTICLES
 
     @stage
-    def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, overlap_share, face_normals):
+    def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, overlap_share, face_normals, axial):
         """Of the candidate in lane i of a slot.
 
         Args:
@@ -46,13 +55,18 @@ def make_touch(features, kind):
             owner_radius: m, of the sample.
             overlap_share: part of the overlap by which the owner's surface yields.
             face_normals: see `box_distance`.
+            axial: see `facing`.
 
         Returns:
             Arm x y z in m from the owner's centre to the contact point, normal x y z out of the
-            surface, penetration in m (negative if apart), and the face of a box to remember, else
-            0; HIDDEN where another part of a compound hides the face that the sample is over.
+            surface, penetration in m (negative if apart), and the face of a box or cylinder to
+            remember, else 0; HIDDEN where another part of a compound hides the face that the sample
+            is over.
         """
         x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
+        if turns:
+            tx, ty = turn(x, y, z, R, c, i, ca, cb, cc)
+            x, y = tx if axial else x, ty if axial else y
         rx = R[0, i] * x + R[1, i] * y + R[2, i] * z
         ry = R[3, i] * x + R[4, i] * y + R[5, i] * z
         rz = R[6, i] * x + R[7, i] * y + R[8, i] * z
@@ -75,6 +89,11 @@ def make_touch(features, kind):
         elif box:
             face = row.memory[remembered_face, i]
             distance, nx, ny, nz, face = box_distance(
+                px, py, pz, ca, cb, cc, face, radius, face_normals
+            )
+        elif cylinder:
+            face = row.memory[remembered_face, i]
+            distance, nx, ny, nz, face = cylinder_distance(
                 px, py, pz, ca, cb, cc, face, radius, face_normals
             )
         elif grid:  # `grid_distances` has looked it up

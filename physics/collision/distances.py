@@ -1,13 +1,14 @@
 """Distance of a point from the core of a surface, and the outward normal there.
 
 Points are in the frame of the surface. All functions are free of branches, so that LLVM can
-vectorise the loops around them, and return (distance m, normal x y z); that of a box also the face.
+vectorise the loops around them, and return (distance m, normal x y z); those of a box and of a
+cylinder also the face.
 """
 
 import math
 
 from physics.compiler.jit import stage
-from physics.scene.shapes import BOX, CAPSULE, PLANE
+from physics.scene.shapes import BOX, CAPSULE, CYLINDER, PLANE, TORUS
 
 
 @stage
@@ -26,6 +27,53 @@ def capsule_distance(x, y, z, a, b, half_length):
     d = math.sqrt(x * x + y * y + z * z)
     inverse = 1.0 / max(d, 1e-150)
     return d, x * inverse if d > 1e-150 else 1.0, y * inverse, z * inverse
+
+
+@stage
+def torus_distance(x, y, z, radius, b, c):
+    """From the circle of a radius about z; on the circle the normal is z."""
+    across = math.sqrt(x * x + y * y)
+    inverse = 1.0 / max(across, 1e-150)
+    ux, uy = x * inverse if across > 1e-150 else 1.0, y * inverse
+    q = across - radius
+    d = math.sqrt(q * q + z * z)
+    inverse = 1.0 / max(d, 1e-150)
+    return d, q * inverse * ux, q * inverse * uy, z * inverse if d > 1e-150 else 1.0
+
+
+@stage
+def cylinder_distance(x, y, z, a, b, half_length, face, radius, face_normals):
+    """From a cylinder of radius a along z; negative inside.
+
+    The rules are those of `box_distance`. The faces to remember: +-3 for +-z, 1 for the side.
+    """
+    across = math.sqrt(x * x + y * y)
+    inverse = 1.0 / max(across, 1e-150)
+    ux, uy = x * inverse if across > 1e-150 else 1.0, y * inverse
+    hr, hz = across - a, abs(z) - half_length
+    outside = max(hr, hz) > 0.0
+
+    # height over the remembered face, and distance beyond its border
+    on_end = abs(face) == 3.0
+    over = math.copysign(1.0, face) * z - half_length if on_end else hr
+    beside = hr if on_end else hz
+    lasting = (over < radius) & (beside < radius) if face_normals else not outside
+    known = lasting & (face != 0.0)
+
+    end = on_end if known else hz > hr
+    outward = math.copysign(1.0, face if known else z)
+    height = over if known else max(hr, hz)
+    beyond = hr if end else hz
+    flat = height if beyond < radius else max(height, beyond)
+
+    round_off = outside & (not face_normals)
+    out_r, out_z = max(hr, 0.0), max(hz, 0.0)
+    out = math.sqrt(out_r * out_r + out_z * out_z)
+    inverse = 1.0 / max(out, 1e-150)
+    radial = out_r * inverse if round_off else (0.0 if end else 1.0)
+    axial = math.copysign(out_z * inverse, z) if round_off else (outward if end else 0.0)
+    distance = out if round_off else flat
+    return distance, radial * ux, radial * uy, axial, 3.0 * outward if end else 1.0
 
 
 @stage
@@ -122,6 +170,20 @@ def _capsule(x, y, z, a, b, c, radius, face_normals):
     return capsule_distance(x, y, z, a, b, c)
 
 
+@stage
+def _cylinder(x, y, z, a, b, c, radius, face_normals):
+    d, nx, ny, nz, _ = cylinder_distance(x, y, z, a, b, c, 0.0, radius, face_normals)
+    return d, nx, ny, nz
+
+
+@stage
+def _torus(x, y, z, a, b, c, radius, face_normals):
+    return torus_distance(x, y, z, a, b, c)
+
+
+_CORES = {PLANE: _plane, BOX: _box, CAPSULE: _capsule, CYLINDER: _cylinder, TORUS: _torus}
+
+
 def core_distance(kind):
     """Distance from the core of one kind of surface, without memory of a face."""
-    return {PLANE: _plane, BOX: _box, CAPSULE: _capsule}.get(kind, _sphere)
+    return _CORES.get(kind, _sphere)

@@ -1,6 +1,7 @@
 """Separations between the samples of a half-pair and its surface, in one lane, for a search."""
 
 from physics.collision.distances import core_distance
+from physics.collision.facing import facing
 from physics.collision.grid_distance import grid_separations
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import at, stage
@@ -32,7 +33,7 @@ def separation_bound(half_pair, i, relative):
 @cached_by_features
 def make_separations(features):
     """Stage that writes the separation [samples] m of every sample of a half-pair."""
-    per_world_parameters = features.per_world_parameters
+    per_world_parameters, axial = features.per_world_parameters, features.axial
 
     def make_loop(kind):
         """A loop without branches over columns of samples, for vector instructions."""
@@ -40,7 +41,7 @@ def make_separations(features):
             return None
         if kind == GRID:
             return grid_separations
-        distance = core_distance(kind)
+        distance, turn = core_distance(kind), facing(kind)
 
         @stage
         def loop(model, half_pair, i, relative, separation):
@@ -50,6 +51,7 @@ def make_separations(features):
             along_y = model.sample[1, first : first + count]
             along_z = model.sample[2, first : first + count]
             core, face_normals = half_pair.core, half_pair.face_normals != 0
+            turns = half_pair.axial != 0
             ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
             radius, size = at(half_pair.radius, i), at(half_pair.owner_size, i)
             xx, xy, xz, x0 = R[0, i], R[1, i], R[2, i], c[0, i]
@@ -59,6 +61,9 @@ def make_separations(features):
                 sx, sy, sz = along_x[s], along_y[s], along_z[s]
                 if per_world_parameters:
                     sx, sy, sz = size * sx, size * sy, size * sz
+                if axial:
+                    tx, ty = turn(sx, sy, sz, R, c, i, ca, cb, cc)
+                    sx, sy = tx if turns else sx, ty if turns else sy
                 x = xx * sx + xy * sy + xz * sz + x0
                 y = yx * sx + yy * sy + yz * sz + y0
                 z = zx * sx + zy * sy + zz * sz + z0

@@ -8,7 +8,16 @@ import inspect
 from typing import Any
 
 from physics.compiler.jit import sequence, stage
-from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE, SPHERE
+from physics.scene.shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    GRID,
+    PARTICLES,
+    PLANE,
+    SPHERE,
+    TORUS,
+)
 
 
 def present_kinds(features):
@@ -19,6 +28,8 @@ def present_kinds(features):
         SPHERE: features.sphere,
         CAPSULE: features.capsule,
         PARTICLES: features.particles,
+        CYLINDER: features.cylinder,
+        TORUS: features.torus,
         GRID: features.grid,
     }
     return [kind for kind, present in kinds.items() if present]

@@ -14,7 +14,7 @@ from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.motion.vectors import rotated
-from physics.scene.shapes import BOX, GRID, PLANE
+from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
 
 
 @cached_by_features
@@ -22,6 +22,7 @@ def make_prepare(features, kind):
     """Stage that writes the rows of a half-pair against one kind of surface."""
     friction, resistance = features.friction, features.resistance
     box, compound = kind == BOX, features.compound
+    has_faces = kind in (BOX, CYLINDER)
     touch = make_touch(features, kind)
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
@@ -53,6 +54,7 @@ def make_prepare(features, kind):
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
         overlap_share = constants.overlap_share
         face_normals, pair_mass = constants.face_normals != 0, constants.pair_mass
+        axial = constants.axial != 0
         for n in range(slots):
             row, point = candidate[n], points[n]
             memory = row.memory
@@ -61,7 +63,7 @@ def make_prepare(features, kind):
                 share = at(overlap_share, i)
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 x, y, z, nx, ny, nz, penetration, face = touch(
-                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals, axial
                 )
                 weight = row.weight[i]
                 if box and compound:
@@ -71,7 +73,7 @@ def make_prepare(features, kind):
                 bx = ax + (a[0, i] - b[0, i])
                 by = ay + (a[1, i] - b[1, i])
                 bz = az + (a[2, i] - b[2, i])
-                if box:
+                if has_faces:
                     face = face if weight > 0.0 else 0.0
                     memory[FACE, i] = face if updates_memory[i] != 0 else memory[FACE, i]
                 point.normal[0, i] = nx

@@ -32,7 +32,18 @@ from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
-from physics.scene.shapes import BOX, CAPSULE, GRID, PARTICLES, PLANE, SPHERE, Samples, Sphere
+from physics.scene.shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    GRID,
+    PARTICLES,
+    PLANE,
+    SPHERE,
+    TORUS,
+    Samples,
+    Sphere,
+)
 from physics.scene.solids import Body, Ground
 from physics.scene.validation import IDENTITY
 
@@ -176,12 +187,13 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         row["face_normals"] = half_pair.face_normals
         ends = (layout.solids[owner], layout.solids[surface])
         row["keeps_all"] = any(isinstance(getattr(s, "shape", None), Mesh) for s in ends)
+        row["axial"] = half_pair.samples.axial
         row["slide_slope"] = 1.0
         row["impact_tolerance"] = layout.fidelity.impact_tolerance
         for sign, body, other in ((1.0, owner, surface), (-1.0, surface, owner)):
             if body < layout.bodies and other >= layout.dynamic_count:
                 row["gravity"] = sign * layout.gravity
-                if layout.leverage[body] == 0.0:  # it rolls
+                if layout.rolls[body]:
                     row["slide_slope"] = layout.modes[body, 1]
         if any(isinstance(solid, Body) for solid in ends):  # nothing else rotates
             for name in ("rolling", "spinning"):
@@ -243,6 +255,9 @@ def _features(
         particles=PARTICLES in kinds,
         grid=GRID in kinds,
         mesh=bool(np.any(model.half_pair["keeps_all"])),
+        cylinder=CYLINDER in kinds,
+        torus=TORUS in kinds,
+        axial=bool(np.any(model.half_pair["axial"])),
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
         fields=bool(scene.fields),

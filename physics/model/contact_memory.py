@@ -22,7 +22,8 @@ class ContactMemory(NamedTuple):
         tangential_force: 3 rows, N, of the last step, in the surface's frame. Impulse law.
         twist: 3 rows. Spring law: N m, of the spring against rolling and spinning. Impulse law:
             N m, torque of the last step.
-        face: 1 row, the face of a box through which the sample came in, see `box_distance`.
+        face: 1 row, the face of a box or cylinder through which the sample came in, see
+            `box_distance`.
     """
 
     size: int
@@ -46,7 +47,7 @@ def contact_memory(features: Features) -> ContactMemory:
         "shear": 3 if coulomb else 0,
         "tangential_force": 3 if coulomb and features.impulse else 0,
         "twist": 3 if features.resistance else 0,
-        "face": 1 if features.box else 0,
+        "face": 1 if features.box or features.cylinder else 0,
     }
     size, first = 0, {}
     for name, count in rows.items():

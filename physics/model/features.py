@@ -30,8 +30,10 @@ class Features(NamedTuple):
         lever: a ball can touch a body beside its centre, which makes the effective mass smaller.
         resistance: at least one pair has rolling or spinning resistance.
         rotation: NO_ROTATION, ISOTROPIC or GENERAL.
-        plane, sphere, box, capsule, particles: kinds of surface that samples are tested against.
+        plane, sphere, box, capsule, particles, cylinder, torus: kinds of surface that samples are
+            tested against.
         grid: likewise, the distance grid of a mesh.
+        axial: some samples turn about their solid's axis, see `collision.facing`.
         mesh: at least one solid is a mesh.
         drives: the scene has drives.
         gripper: at least two of the drives are the fingers of a gripper.
@@ -57,7 +59,10 @@ class Features(NamedTuple):
     box: bool
     capsule: bool
     particles: bool
+    cylinder: bool
+    torus: bool
     grid: bool
+    axial: bool
     mesh: bool
     drives: bool
     gripper: bool

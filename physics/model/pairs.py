@@ -12,14 +12,17 @@ import numpy as np
 
 from physics.model.rocking import fastest_modes, rocking_leverage
 from physics.scene.compound import Compound, SampleSet
+from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
+from physics.scene.particles import Particles
 from physics.scene.scene import Scene
 from physics.scene.shapes import PARTICLES, PLANE, Box, Samples, Shape, Sphere, Surface
 from physics.scene.solids import Body, Ground, Static, touch_each_other
+from physics.scene.torus import Torus
 
 Array = np.ndarray
 Solid = Body | Drive | Static | Ground
@@ -69,6 +72,7 @@ class Layout(NamedTuple):
         parts: (solid, part) of compounds; empty if no half-pair tests any of them.
         modes: [solids, 2] see `rocking.fastest_modes`; 1 for what doesn't rotate.
         leverage: [solids] see `rocking.rocking_leverage`; 0 for what isn't a body.
+        rolls: [solids] whether it is a body that can roll.
         gravity: [3] m/s^2.
         fidelity: of the physics.
     """
@@ -80,6 +84,7 @@ class Layout(NamedTuple):
     parts: tuple[tuple[int, Part], ...]
     modes: Array
     leverage: Array
+    rolls: Array
     gravity: Array
     fidelity: Fidelity
 
@@ -91,9 +96,11 @@ class Layout(NamedTuple):
         half_pairs = tuple(_half_pairs(scene, fidelity, parts))
         modes = [(1.0, 1.0)] * len(solids)
         leverage = [0.0] * len(solids)
+        rolls = np.zeros(len(solids), dtype=bool)
         for i, body in enumerate(scene.bodies):
             modes[i] = fastest_modes(body.shape, 0.5 * body.shape.width)  # for every fidelity
             leverage[i] = rocking_leverage(_single(body.shape))
+            rolls[i] = leverage[i] == 0.0 or isinstance(body.shape, Cylinder | Torus)
         return cls(
             solids=solids,
             dynamic_count=len(scene.bodies) + len(scene.driven_bodies),
@@ -102,6 +109,7 @@ class Layout(NamedTuple):
             parts=parts if any(half_pair.part >= 0 for half_pair in half_pairs) else (),
             modes=np.array(modes).reshape(-1, 2),
             leverage=np.array(leverage),
+            rolls=rolls,
             gravity=np.array(scene.gravity),
             fidelity=fidelity,
         )
@@ -154,7 +162,8 @@ def _half_pairs(
         inset = max(rounding(solid), min(least, 0.25 * shape.width))
         if isinstance(shape, Compound):
             return shape.sample_sets(distance, inset)
-        return (SampleSet(shape.samples(distance, inset), isinstance(shape, Box | Mesh)),)
+        flat = isinstance(shape, Box | Cylinder | Mesh)
+        return (SampleSet(shape.samples(distance, inset), flat),)
 
     def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""
@@ -195,7 +204,13 @@ def _half_pairs(
                 pa, pb = particles(a), particles(b)
                 yield HalfPair(i, j, pa, Surface(PARTICLES, (0.0, 0.0, 0.0), pb.radius), pb)
                 continue
-            if fidelity.geometry == "particle" and isinstance(a, Body):
+            balls = isinstance(a.shape, Particles), isinstance(b.shape, Particles)
+            if all(balls):
+                pa, pb = particles(a), particles(b)
+                yield HalfPair(i, j, pa, b.shape.surface(0.0), pb)
+            elif any(balls):  # balls against an exact surface
+                yield from between(i, j) if balls[0] else between(j, i)
+            elif fidelity.geometry == "particle" and isinstance(a, Body):
                 yield from between(i, j)  # particles leave no gap for a drive to slip through
             elif isinstance(_single(a.shape), Sphere):
                 yield from between(i, j)  # the centre of a sphere is exact

@@ -7,8 +7,11 @@ rod or plate rocks faster than it bobs, which limits the stiffness that a time s
 import numpy as np
 
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.mesh import Mesh
-from physics.scene.shapes import Box, Shape
+from physics.scene.particles import Particles
+from physics.scene.shapes import Box, Samples, Shape
+from physics.scene.torus import Torus
 
 Array = np.ndarray
 
@@ -27,15 +30,19 @@ def largest_eigenvalue(inverse_mass: Array, A: Array) -> float:
 
 
 def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
-    """Unit stiffness along and across the normal, [6, 6] each, for each of the six sides.
+    """Unit stiffness along and across the normal, [6, 6] each, for each side it can lie on.
 
-    A mesh has its flat sides besides. The samples that touch share the stiffness by their weights.
+    The samples that touch share the stiffness by their weights. Particles have sides of their own,
+    all other shapes the six normal to their axes, and a mesh its flat sides besides.
     """
-    positions, weights, radius = shape.samples(spacing, 0.0)
+    samples = shape.samples(spacing, 0.0)
+    weights, radius = samples.weights, samples.radius
     radii = np.broadcast_to(radius, len(weights))
     found = []
+    own = -shape.sides if isinstance(shape, Particles) else (*np.eye(3), *-np.eye(3))
     others = shape.sides() if isinstance(shape, Mesh) else ()
-    for normal in (*np.eye(3), *-np.eye(3), *others):
+    for normal in (*own, *others):
+        positions = facing(samples, normal)
         height = positions @ normal - radii
         lowest = height <= height.min() + 1e-9
         along, across = np.zeros((6, 6)), np.zeros((6, 6))
@@ -46,6 +53,15 @@ def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
             across += weight * (jacobian.T @ jacobian - normal_part)
         found.append((along, across))
     return found
+
+
+def facing(samples: Samples, normal: Array) -> Array:
+    """Positions [n, 3] m of samples, turned to face a plane with a normal [3] if they are axial."""
+    length = float(np.hypot(normal[0], normal[1]))
+    if not samples.axial or length == 0.0:
+        return samples.positions
+    x, y = -normal[:2] / length
+    return np.asarray(samples.positions @ np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]]))
 
 
 def fastest_modes(shape: Shape, spacing: float) -> tuple[float, float]:
@@ -62,10 +78,12 @@ def rocking_leverage(shape: Shape) -> float:
     """Stiffness times the squared height over the face, divided by the stiffness against rocking.
 
     For a box on its widest face, which is where a body that slides comes to rest; a compound is
-    or mesh is taken on the side with the least leverage; balls and capsules don't rock.
+    taken on the side with the least leverage, as are a mesh, a cylinder, a torus and particles;
+    balls and capsules don't rock.
     """
-    if isinstance(shape, Compound):
-        return _leverage_of_samples(*shape.samples(0.5 * shape.width, 0.0))
+    if isinstance(shape, Compound | Cylinder | Torus | Particles):
+        samples = shape.samples(0.5 * shape.width, 0.0)
+        return _leverage_of_samples(samples.positions, samples.weights, samples.radius)
     if isinstance(shape, Mesh):
         return _leverage_of_mesh(shape)
     if not isinstance(shape, Box):
@@ -75,7 +93,7 @@ def rocking_leverage(shape: Shape) -> float:
     return sum(height**2 / (0.75 * side**2) for side in sides) / 2.0
 
 
-def _leverage_of_samples(positions: Array, weights: Array, radii: Array) -> float:
+def _leverage_of_samples(positions: Array, weights: Array, radii: float | Array) -> float:
     """The least leverage of the six sides that a solid with these samples can lie on."""
     # m^2, below which the extent of a side is round-off: the solid can't lie on a line
     found, least = [], (1e-6 * np.abs(positions).max()) ** 2

@@ -55,7 +55,8 @@ HALF_PAIR = np.dtype(
         ("slot_count", "i8"),
         ("grid", "i8"),  # row of Model.grid that is the surface, or -1
         ("keeps_all", "i8"),  # 1: a solid is a mesh, its manifold is not reduced
-        ("face_normals", "i8"),  # 1: samples of a box, which faces push out, see `box_distance`
+        ("axial", "i8"),  # 1: the samples turn to face the surface, see `collision.facing`
+        ("face_normals", "i8"),  # 1: samples of what has faces, see `box_distance`
         # of a body on a ground or static: gravity of the owner less that of the surface, m/s^2, in
         # the world frame; and the slope above which it slides, over mu: more than 1 if it can roll
         ("gravity", "f8", (3,)),

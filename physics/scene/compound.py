@@ -19,17 +19,17 @@ axes, the one with the largest sum of weights gets the sum 1.
 Each part is a surface of its own.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations, product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.scene.directions import spread_directions
 from physics.scene.mass import MassProperties, combine
 from physics.scene.part import Part, Simple
+from physics.scene.principal_axes import check_principal_axes
 from physics.scene.shapes import Box, Samples, Surface
 
 Array = np.ndarray
@@ -40,20 +40,9 @@ _SAME = 1e-6
 _AROUND = 1e-3
 # fraction of directions into solid from which on a sample is removed; at a flat face it is 0.5
 _FLAT = 0.45
-# largest product of inertia of principal axes, as a fraction of the tensor's trace
-_ASKEW = 1e-9
 
 
-def _directions(count: int) -> Array:
-    """Unit vectors [count, 3] spread evenly over all directions (Fibonacci sphere)."""
-    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    angle = np.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1) * np.sqrt(
-        1.0 - z * z
-    ).reshape(-1, 1) + z.reshape(-1, 1) * np.array([0.0, 0.0, 1.0])
-
-
-_DIRECTIONS = _directions(200)
+_DIRECTIONS = spread_directions(200)
 
 
 class SampleSet(NamedTuple):
@@ -102,15 +91,7 @@ class Compound:
                 for part, place in zip(parts, places - center, strict=True)
             ]
         object.__setattr__(self, "parts", tuple(parts))
-        tensor = self._tensor
-        askew = tensor - np.diag(np.diag(tensor))
-        if np.abs(askew).max() > _ASKEW * np.trace(tensor):
-            i, j = np.unravel_index(np.abs(askew).argmax(), (3, 3))
-            raise ValueError(
-                f"Compound.parts must have their principal axes along x, y and z, got a product of "
-                f"inertia J_{'xyz'[i]}{'xyz'[j]} of {askew[i, j]:.3g} kg m^2 per kg: rotate all "
-                f"parts by the quaternion {_to_axes(tensor)}"
-            )
+        check_principal_axes("Compound.parts", "parts", self._tensor)
 
     @cached_property
     def _tensor(self) -> Array:
@@ -276,20 +257,6 @@ def _part(i: int, item: Any) -> Part:
         return Part(*item)
     except (TypeError, ValueError) as error:
         raise type(error)(f"Compound.parts[{i}]: {error}") from None
-
-
-def _to_axes(tensor: Array) -> tuple[float, ...]:
-    """Quaternion of the smallest rotation that aligns the principal axes with x, y and z."""
-    axes = np.linalg.eigh(tensor)[1].T
-    rotations = [
-        axes[list(order)] * np.array(signs)[:, None]
-        for order in permutations(range(3))
-        for signs in product((1.0, -1.0), repeat=3)
-    ]
-    R = max((matrix for matrix in rotations if np.linalg.det(matrix) > 0.0), key=np.trace)
-    w = 0.5 * math.sqrt(max(1.0 + np.trace(R), 0.0))
-    x, y, z = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
-    return tuple(round(float(c), 15) for c in (x / (4 * w), y / (4 * w), z / (4 * w), w))
 
 
 def _joined(rows: Array, same: float) -> Array:

@@ -96,3 +96,22 @@ def capsule_inertia(mass: float | Array, radius: float, half_length: float) -> A
         0.4 * r**2 + half**2 + 0.75 * half * r
     )
     return np.stack([transverse, transverse, axial], axis=-1)
+
+
+def cylinder_inertia(mass: float | Array, radius: float, half_length: float) -> Array:
+    """Principal moments [..., 3] in kg m^2 of a solid cylinder of mass [...] in kg along z.
+
+    m r^2 / 2 about its axis, m (r^2 / 4 + l^2 / 3) across it, l the half length.
+    """
+    transverse = radius**2 / 4.0 + half_length**2 / 3.0
+    return np.multiply.outer(mass, np.array([transverse, transverse, 0.5 * radius**2]))
+
+
+def torus_inertia(mass: float | Array, major_radius: float, minor_radius: float) -> Array:
+    """Principal moments [..., 3] in kg m^2 of a solid torus of mass [...] in kg about z.
+
+    m (R^2 + 3/4 a^2) about its axis, m (R^2 / 2 + 5/8 a^2) across it, R and a its radii.
+    """
+    R, a = major_radius**2, minor_radius**2
+    transverse = R / 2.0 + 5.0 / 8.0 * a
+    return np.multiply.outer(mass, np.array([transverse, transverse, R + 3.0 / 4.0 * a]))

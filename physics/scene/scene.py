@@ -13,20 +13,23 @@ from typing import Any, cast
 
 from physics.scene import saving
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
 from physics.scene.joints import BallJoint, Distance, Hinge, Joint, Motor, Slider, Weld
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
+from physics.scene.particles import Particles
 from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
+from physics.scene.torus import Torus
 from physics.scene.validation import ZERO, Vector, instance, vector
 
 # classes of all objects that a scene is made of
 _PARTS = (
     Body, Ground, Static, Drive, Gripper, Material, PointSpring, Attractor, Drag,
-    Sphere, Box, Capsule, Compound, Part, Mesh,
+    Sphere, Box, Capsule, Compound, Part, Cylinder, Torus, Particles, Mesh,
     BallJoint, Hinge, Slider, Weld, Distance, Motor,
 )  # fmt: skip
 

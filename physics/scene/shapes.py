@@ -28,9 +28,7 @@ from physics.scene.validation import positive, vector
 Array = np.ndarray
 
 # kinds of surface that samples are tested against
-PLANE, SPHERE, BOX, CAPSULE, PARTICLES = range(5)
-# a signed distance on a grid
-GRID = 7
+PLANE, SPHERE, BOX, CAPSULE, PARTICLES, CYLINDER, TORUS, GRID = range(8)
 
 
 class Samples(NamedTuple):
@@ -40,20 +38,24 @@ class Samples(NamedTuple):
         positions: [n, 3] m in the body frame.
         weights: [n], dimensionless fractions of a face's contact stiffness.
         radius: m, one for all samples, or [n] one for each.
+        axial: whether they turn about z to face a surface, see `physics.collision.facing`.
     """
 
     positions: Array
     weights: Array
     radius: Any
+    axial: bool = False
 
 
 class Surface(NamedTuple):
     """A surface that samples are tested against.
 
     Attributes:
-        kind: PLANE, SPHERE, BOX, CAPSULE, PARTICLES or GRID.
+        kind: PLANE, SPHERE, BOX, CAPSULE, PARTICLES, CYLINDER, TORUS or GRID.
         parameters: m, of the core: the half extents of a box; 0, 0 and the half length of a
-            capsule; the height of a plane, 0 and 0; of a grid, a box around the mesh; else zeros.
+            capsule; twice the radius and the half length of a cylinder; twice the radius of a
+            torus's circle and 0; the height of a plane, 0 and 0; of a grid, a box around the mesh;
+            zeros for the other kinds.
         radius: m, rounding radius around the core.
         mesh: of a GRID, the Mesh.
     """

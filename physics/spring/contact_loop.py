@@ -12,7 +12,7 @@ from physics.collision.contact_point import HIDDEN, make_touch
 from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.scene.shapes import BOX, PLANE
+from physics.scene.shapes import BOX, CYLINDER, PLANE
 from physics.spring.coulomb import friction_force, is_set_down, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
 from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
@@ -38,6 +38,7 @@ def make_contact_loop(features, kind, report):
     slope, lever = features.slope, features.lever
     normal_force = dashpot_force if features.dashpot else hunt_crossley_force
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    has_faces = kind in (BOX, CYLINDER)
     touch = make_touch(features, kind)
     memory_rows = contact_memory(features)
     FORCE, SPEED, APPROACH = (
@@ -62,7 +63,7 @@ def make_contact_loop(features, kind, report):
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight, updates = relative.current_weight, relative.updates_candidates
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
-        face_normals = constants.face_normals != 0
+        face_normals, axial = constants.face_normals != 0, constants.axial != 0
         overlap_share = constants.overlap_share
         gravity, fall, steep = constants.gravity, relative.gravity, constants.slide_slope
         rolling, spinning = constants.rolling, constants.spinning
@@ -80,7 +81,7 @@ def make_contact_loop(features, kind, report):
                 share = at(overlap_share, i)
                 inverse_mass, speed_per_load = inverse_masses[i], speeds_per_load[i]
                 rx, ry, rz, nx, ny, nz, penetration, face = touch(
-                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals
+                    row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals, axial
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
@@ -105,7 +106,7 @@ def make_contact_loop(features, kind, report):
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
                 approach = -uz if plane else -(ux * nx + uy * ny + uz * nz)
                 impact_speed = memory[SPEED, i]
-                if box:  # a sample that changed the face is a new contact
+                if has_faces:  # a sample that changed the face is a new contact
                     same = (face == memory[FACE, i]) | (not face_normals)
                     impact_speed = impact_speed if same else 0.0
                 begins = impact_speed == 0.0
@@ -135,7 +136,7 @@ def make_contact_loop(features, kind, report):
                 kept = approach if weight > 0.0 else 0.0
                 memory[APPROACH, i] = kept if updates_memory else memory[APPROACH, i]
                 current_weight[i] += weight if normal > 0.0 else 0.0
-                if box:
+                if has_faces:
                     face = face if weight > 0.0 else 0.0
                     memory[FACE, i] = face if updates_memory else memory[FACE, i]
                 if plane:

@@ -20,9 +20,11 @@ The force acts at the ball's centre, and reports of contacts don't include it.
 import math
 
 from physics.collision.distances import box_distance
+from physics.collision.facing import facing
 from physics.compiler.jit import LANES, at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
+from physics.scene.shapes import BOX
 
 
 @stage
@@ -43,6 +45,7 @@ def _square(penetration):
 def make_energy_correction(features):
     """Stage for the slots of a half-pair of balls or capsules against a box."""
     compound, remembered_face = features.compound, contact_memory(features).face
+    axial, turn = features.axial, facing(BOX)
 
     @stage
     def correct_energy(slots, candidate, relative, constants, h):
@@ -51,11 +54,15 @@ def make_energy_correction(features):
         force, torque = relative.force, relative.torque
         radii, core, stiffness = constants.radius, constants.core, constants.stiffness
         pair_mass, inverse_inertia = constants.pair_mass, constants.surface_inverse_inertia
-        centre = constants.surface_centre
+        centre, turns = constants.surface_centre, constants.axial != 0
         for n in range(slots):
             row = candidate[n]
             for i in range(LANES):
                 x, y, z = row.sample[0, i], row.sample[1, i], row.sample[2, i]
+                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
+                if axial:
+                    tx, ty = turn(x, y, z, R, c, i, ca, cb, cc)
+                    x, y = tx if turns else x, ty if turns else y
                 rx = R[0, i] * x + R[1, i] * y + R[2, i] * z
                 ry = R[3, i] * x + R[4, i] * y + R[5, i] * z
                 rz = R[6, i] * x + R[7, i] * y + R[8, i] * z
@@ -63,7 +70,6 @@ def make_energy_correction(features):
                 sy = 0.5 * h * (v[1, i] + omega[2, i] * rx - omega[0, i] * rz)
                 sz = 0.5 * h * (v[2, i] + omega[0, i] * ry - omega[1, i] * rx)
                 px, py, pz = rx + c[0, i], ry + c[1, i], rz + c[2, i]
-                ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 radius, face, weight = at(radii, i), row.memory[remembered_face, i], row.weight[i]
                 wx = wy = wz = 0.0
                 if compound:

@@ -1,0 +1,68 @@
+"""Samples of solids of revolution turn about their solid's z axis until the first faces a surface.
+
+The samples of a cylinder or torus lie on circles about its axis. On a solid of revolution they may
+lie there at any angle, so they need not rotate with it: at every step they are turned such that the
+first of each circle is the circle's point nearest to the surface. Fixed samples would make a
+polygon of a wheel: with n corners it rises and falls by r (1 - cos(pi/n)), 0.5 % of the radius r at
+n = 32, and loses energy at each corner.
+
+The nearest point of a circle lies opposite to the normal that the surface has at the circle's
+centre. That is exact over planes and spheres, and over any surface whose normal is the same at the
+centre and at the contact; elsewhere the first sample is a point of the circle near the nearest one.
+The nearest point is an extremum: its height changes at the rate at which the material there moves.
+So an elastic contact keeps its energy.
+
+A circle parallel to the surface has no nearest point. It keeps the angle at which it is in the
+body, because of a bias: a tilt of _BIAS rad that is added to the real one. Evenly spaced samples,
+three or more, resist any tilt as a whole circle does, whatever their angle.
+"""
+
+import math
+
+from physics.collision.distances import core_distance
+from physics.compiler.jit import stage
+from physics.scene.shapes import PLANE
+
+# rad. It displaces the lowest point of a circle that is tilted by more by _BIAS / tilt rad at most
+_BIAS = 1e-6
+
+
+@stage
+def _turned(x, y, mx, my, mz):
+    """Turns x y about z such that x points against the normal m, given in the body's frame."""
+    # none for a body on its side, which rolls
+    dx, dy = _BIAS * mz * mz - mx, -my
+    length = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / max(length, 1e-150)
+    cosine = dx * inverse if length > 1e-150 else 1.0
+    sine = dy * inverse
+    return cosine * x - sine * y, sine * x + cosine * y
+
+
+@stage
+def _over_plane(x, y, z, R, c, i, ca, cb, cc):
+    return _turned(x, y, R[6, i], R[7, i], R[8, i])
+
+
+def facing(kind):
+    """Stage that turns a sample x y z of an axial solid towards one kind of surface.
+
+    Its arguments: the sample in the solid's frame in m; the solid's rotation R and position c
+    relative to the surface; the lane; the parameters of the surface's core. It returns x and y.
+    Axial solids have no samples against particles.
+    """
+    if kind == PLANE:
+        return _over_plane
+    distance = core_distance(kind)
+
+    @stage
+    def turn(x, y, z, R, c, i, ca, cb, cc):
+        # the centre of the sample's circle
+        px, py, pz = R[2, i] * z + c[0, i], R[5, i] * z + c[1, i], R[8, i] * z + c[2, i]
+        _, nx, ny, nz = distance(px, py, pz, ca, cb, cc, 0.0, False)
+        mx = R[0, i] * nx + R[3, i] * ny + R[6, i] * nz
+        my = R[1, i] * nx + R[4, i] * ny + R[7, i] * nz
+        mz = R[2, i] * nx + R[5, i] * ny + R[8, i] * nz
+        return _turned(x, y, mx, my, mz)
+
+    return turn
