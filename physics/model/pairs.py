@@ -133,6 +133,17 @@ def _single(shape: Shape) -> Shape:
     return shape if only is None else only
 
 
+def is_floor(solid: Solid, shape: Shape) -> bool:
+    """Whether the samples of a cylinder or torus turn over a solid.
+
+    Over a ground; and over a static box of which two sides are at least twice as long as the shape,
+    so that the shape is rarely beyond the border of the face that it is on.
+    """
+    if isinstance(solid, Static) and isinstance(solid.shape, Box):
+        return sorted(solid.shape.half_extents)[1] >= 2.0 * shape.reach
+    return isinstance(solid, Ground)
+
+
 def _parts(solid: Solid) -> tuple[Part, ...]:
     """The parts of a compound, which have a surface each; none for other solids."""
     if isinstance(solid, Ground):
@@ -154,7 +165,9 @@ def _half_pairs(
     def particles(solid: Body | Drive | Static) -> Samples:
         return solid.shape.particles(spacing(solid.shape, scene, fidelity))
 
-    def sample_sets(solid: Body | Drive | Static, least: float = 0.0) -> tuple[SampleSet, ...]:
+    def sample_sets(
+        solid: Body | Drive | Static, other: Solid, least: float = 0.0
+    ) -> tuple[SampleSet, ...]:
         """Samples that are inset by the rounding, and by at least `least` m if they can be."""
         if fidelity.geometry == "particle" and isinstance(solid, Body):
             return (SampleSet(particles(solid), False),)
@@ -162,8 +175,14 @@ def _half_pairs(
         inset = max(rounding(solid), min(least, 0.25 * shape.width))
         if isinstance(shape, Compound):
             return shape.sample_sets(distance, inset)
-        flat = isinstance(shape, Box | Cylinder | Mesh)
-        return (SampleSet(shape.samples(distance, inset), flat),)
+        samples: tuple[Samples, ...]
+        if isinstance(shape, Cylinder | Torus) and not is_floor(other, shape):
+            samples = shape.fixed_samples(distance, inset)
+        else:
+            samples = (shape.samples(distance, inset),)
+        if isinstance(shape, Cylinder):  # the balls inside it have no faces
+            return tuple(SampleSet(one, one.radius == inset) for one in samples)
+        return tuple(SampleSet(one, isinstance(shape, Box | Mesh)) for one in samples)
 
     def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""
@@ -180,7 +199,7 @@ def _half_pairs(
         least = b.shape.edge_radius if isinstance(b.shape, Mesh) else 0.0
         return [
             HalfPair(owner, other, samples, surface, None, part=k, face_normals=face_normals)
-            for samples, face_normals in sample_sets(a, least)
+            for samples, face_normals in sample_sets(a, b, least)
             for k, surface in surfaces
         ]
 
@@ -196,7 +215,7 @@ def _half_pairs(
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
-                for samples, face_normals in sample_sets(a):
+                for samples, face_normals in sample_sets(a, b):
                     yield HalfPair(i, j, samples, plane, None, face_normals=face_normals)
                 continue
             bodies = isinstance(a, Body) and isinstance(b, Body)

@@ -1,12 +1,15 @@
 """Cylinder: a shape that stands on its faces and rolls on its side.
 
-Its core is a cylinder inset by the rounding, so its rims are rounded. A cylinder is a solid of
-revolution, so its samples may have any angle about its axis: the engine turns them such that the
-first one faces the surface, see `physics.collision.facing`. A cylinder on its side therefore rests
-on its lowest line at every angle, and rolls without the corners that fixed samples would give it.
+Its core is a cylinder inset by the rounding, so its rims are rounded. It has two sets of samples:
 
-Eight samples lie on each rim. A face has the weight 1, a point of a rim 1/8 (as a corner of a box),
-and the side 1 with the two rim points at its ends.
+- Over a ground or large static box they turn about the axis such that the first one faces the
+  surface, see `physics.collision.facing`. On its side a cylinder therefore rests on its lowest line
+  at every angle, and rolls without the corners that fixed samples would give it. Eight samples lie
+  on each rim. A face has the weight 1, a point of a rim 1/8 (as a corner of a box), and the side 1
+  with the two rim points at its ends.
+- Elsewhere they are fixed: sixteen on each rim, and the largest balls that fit inside, in a row on
+  the axis of a cylinder that is longer than wide. A face has the weight 1, and so has the row with
+  one point of each rim.
 """
 
 import math
@@ -20,8 +23,9 @@ from physics.scene.validation import positive
 
 Array = np.ndarray
 
-# samples of a rim, a multiple of four: they have the extents of the circle along x and y
-RIM_SAMPLES = 8
+# samples of a rim, of those that turn and of the fixed ones. Multiples of four, so that they have the
+# extents of the circle along x and y
+RIM_SAMPLES, FIXED_RIM_SAMPLES = 8, 16
 
 
 def circle(count: int, radius: float, height: float = 0.0) -> Array:
@@ -74,13 +78,9 @@ class Cylinder:
         return Cylinder(factor * self.radius, factor * self.half_length)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """Samples on both rims of the inset core, and on one line of its side between them.
-
-        The line's samples are at most half the spacing apart: another cylinder across it touches
-        between two of them.
-        """
+        """Samples that turn: on both rims of the inset core, and on a line of its side."""
         radius, end = self.radius - rounding, self.half_length - rounding
-        count = max(2, math.ceil(4.0 * self.half_length / spacing - 1e-9))
+        count = max(2, math.ceil(2.0 * self.half_length / spacing - 1e-9))
         side = np.zeros((count, 3))
         side[:, 0], side[:, 2] = radius, end * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
         rim = 1.0 / RIM_SAMPLES
@@ -88,6 +88,21 @@ class Cylinder:
         weights = np.full(2 * RIM_SAMPLES + count, rim)
         weights[2 * RIM_SAMPLES :] = (1.0 - 2.0 * rim) / count
         return Samples(np.concatenate(positions), weights, rounding, axial=True)
+
+    def fixed_samples(self, spacing: float, rounding: float) -> tuple[Samples, ...]:
+        """Samples that do not turn: on both rims of the inset core, and balls on the axis."""
+        radius, end = self.radius - rounding, self.half_length - rounding
+        rims = [circle(FIXED_RIM_SAMPLES, radius, z) for z in (-end, end)]
+        rim = 1.0 / FIXED_RIM_SAMPLES
+        sets = [Samples(np.concatenate(rims), np.full(2 * FIXED_RIM_SAMPLES, rim), rounding)]
+        row = self.half_length - self.radius  # half its length
+        if row > 0.0:
+            count = max(1, math.ceil(2.0 * row / spacing - 1e-9)) + 1
+            balls = np.zeros((count, 3))
+            balls[:, 2] = np.linspace(-row, row, count)
+            weights = np.full(count, (1.0 - 2.0 * rim) / count)
+            sets.append(Samples(balls, weights, self.radius))
+        return tuple(sets)
 
     def particles(self, spacing: float) -> Samples:
         """Equal spheres in rings over both faces and the side.

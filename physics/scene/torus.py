@@ -1,11 +1,12 @@
 """Torus: a ring that lies on a circle and rolls upright on a point.
 
-Its core is a circle, with the minor radius around it. As those of a cylinder, its samples turn
-about its axis such that the first one faces the surface, see `physics.collision.facing`. So it
-touches a plane in its lowest point at every angle.
+Its core is a circle, with the minor radius around it. As a cylinder it has two sets of samples:
 
-Eight samples of equal weight lie on the core. Flat on a plane all of them touch, with the weight 1
-in all; upright one touches, with 1/8, as a corner of a box.
+- Over a ground or large static box eight samples of equal weight turn about its axis such that the
+  first one faces the surface, see `physics.collision.facing`. So it touches in its lowest point at
+  every angle. Flat all of them touch, with the weight 1 in all; upright one touches, with 1/8, as a
+  corner of a box.
+- Elsewhere they are fixed balls of equal weight, 1 in all, at most one minor radius apart.
 """
 
 import math
@@ -70,11 +71,15 @@ class Torus:
         return Torus(factor * self.major_radius, factor * self.minor_radius)
 
     def samples(self, spacing: float, rounding: float) -> Samples:
-        """Eight samples on the core, at any spacing: they turn to where the surface is nearest."""
+        """Samples that turn: eight on the core, at any spacing."""
         weights = np.full(RIM_SAMPLES, 1.0 / RIM_SAMPLES)
         return Samples(
             circle(RIM_SAMPLES, self.major_radius), weights, self.minor_radius, axial=True
         )
+
+    def fixed_samples(self, spacing: float, rounding: float) -> tuple[Samples, ...]:
+        """Samples that do not turn: the particles."""
+        return (self.particles(spacing),)
 
     def particles(self, spacing: float) -> Samples:
         """Spheres of the minor radius on the core, at most that radius apart."""
