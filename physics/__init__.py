@@ -7,7 +7,7 @@ from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive, Gripper
 from physics.scene.fidelity import PRESETS, Fidelity
-from physics.scene.fields import Attractor, Drag, PointSpring
+from physics.scene.fields import Attractor, Drag, PointSpring, SurfaceDrag
 from physics.scene.joints import BallJoint, Distance, Hinge, Motor, Slider, Weld
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
@@ -55,6 +55,7 @@ __all__ = [
     "Sphere",
     "Static",
     "StepVanished",
+    "SurfaceDrag",
     "Torus",
     "Weld",
     "World",

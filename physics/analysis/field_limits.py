@@ -10,8 +10,8 @@ whose largest eigenvalue bounds omega^2. The same matrix of the damping bounds g
 linear drag over mass of a body adds. A step is stable if x'' = -omega^2 x - gamma x' is: the scheme
 of the integrator, with the velocities of `motion.fields`, is linear in (x, v, a), with the spectral
 radius of its matrix at most 1. Pull and drag that grow with closeness or speed (attractors,
-quadratic drag) have no such limit. The adaptive integrator needs none: its error control shortens
-the steps.
+quadratic drag, surface drag) have no such limit. The adaptive integrator needs none: its error
+control shortens the steps.
 """
 
 import math
@@ -20,7 +20,7 @@ from itertools import accumulate, product
 import numpy as np
 
 from physics.model.tables import DRAG, POINT_SPRING, Model
-from physics.scene.fields import Attractor, Drag
+from physics.scene.fields import Drag, PointSpring
 from physics.scene.scene import Scene
 
 Array = np.ndarray
@@ -105,7 +105,7 @@ def longest_step(scene: Scene, model: Model, integrator: str) -> tuple[float, in
     drag = max(gamma, most) * low > math.sqrt(square) * low
     if not drag or gamma >= most:
         index = damped if drag else stiff
-        fields = [i for i, f in enumerate(scene.fields) if not isinstance(f, Attractor | Drag)]
+        fields = [i for i, f in enumerate(scene.fields) if isinstance(f, PointSpring)]
     else:
         index, fields = 0, [i for i, f in enumerate(scene.fields) if isinstance(f, Drag)]
         fields.sort(key=lambda i: -scene.fields[i].linear)  # type: ignore[union-attr]

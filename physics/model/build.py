@@ -27,7 +27,7 @@ from physics.model.tables import (
     Model,
 )
 from physics.scene.fidelity import INTEGRATORS, TIME_CONTROLS, Fidelity
-from physics.scene.fields import PointSpring
+from physics.scene.fields import PointSpring, SurfaceDrag
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
@@ -90,7 +90,8 @@ def build(
     world = len(dynamic) + len(static) + len(parts)  # row of Workspace.solid
     joints = joint_rows(scene, world)
     tables = (dynamic, half_pairs, parts, hidden, static, samples)
-    model = Model(*tables, field_rows(scene), joints, grids, nodes)
+    fields, points = field_rows(scene)
+    model = Model(*tables, fields, joints, grids, nodes, points)
     return model, _features(scene, fidelity, model, per_world_parameters)
 
 
@@ -171,8 +172,11 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
     row: Any
     for members in pairs.values():
         rows["next_in_pair"][members] = np.roll(members, -1)
-        owners = {layout.half_pairs[k].owner for k in members}
-        rows["reverse"][members] = members[::-1] if len(members) == len(owners) == 2 else -1
+        rows["reverse"][members] = -1
+        facing = [k for k in members if not layout.half_pairs[k].inner]
+        owners = {layout.half_pairs[k].owner for k in facing}
+        if len(facing) == len(owners) == 2:
+            rows["reverse"][facing] = facing[::-1]
     for row, half_pair in zip(rows, layout.half_pairs, strict=True):
         owner, surface, part = half_pair.owner, half_pair.other, half_pair.part
         row["owner"], row["surface"] = owner, surface
@@ -261,6 +265,7 @@ def _features(
         drives=bool(scene.drives),
         gripper=bool(scene.grippers),
         fields=bool(scene.fields),
+        surface_drag=any(isinstance(field, SurfaceDrag) for field in scene.fields),
         wrench=False,
         joints=bool(scene.joints),
         compound=len(model.compound_part) > 0,

@@ -38,6 +38,7 @@ class Features(NamedTuple):
         drives: the scene has drives.
         gripper: at least two of the drives are the fingers of a gripper.
         fields: the scene has fields: springs to points, attractors, drag.
+        surface_drag: at least one of them is a surface drag.
         wrench: `World.apply_wrench` has been used.
         joints: the scene has joints.
         compound: at least one surface is a part of a compound and has its own frame.
@@ -67,6 +68,7 @@ class Features(NamedTuple):
     drives: bool
     gripper: bool
     fields: bool
+    surface_drag: bool
     wrench: bool
     joints: bool
     compound: bool

@@ -4,16 +4,20 @@ from typing import Any
 
 import numpy as np
 
-from physics.model.tables import ATTRACTOR, DRAG, FIELD, POINT_SPRING
-from physics.scene.fields import Attractor, PointSpring
+from physics.model.tables import ATTRACTOR, DRAG, FIELD, POINT_SPRING, SURFACE_DRAG
+from physics.scene.fields import Attractor, PointSpring, SurfaceDrag
 from physics.scene.scene import Scene
+from physics.scene.surface_points import surface_points
 
 Array = np.ndarray
 
 
-def field_rows(scene: Scene) -> Array:
-    """Rows of FIELD: one per field; a Drag without a body has one for each body."""
-    rows = []
+def field_rows(scene: Scene) -> tuple[Array, Array]:
+    """Rows of FIELD: one per field, or one for each body; and columns of Model.surface_point.
+
+    A Drag or SurfaceDrag without a body has one row for each body.
+    """
+    rows, blocks, first = [], [np.zeros((7, 0))], 0
     for field in scene.fields:
         row: Any = np.zeros(1, dtype=FIELD)[0]
         row["other"] = -1
@@ -29,6 +33,22 @@ def field_rows(scene: Scene) -> Array:
             row["kind"], row["to"] = ATTRACTOR, field.position
             row["strength"], row["exponent"] = field.strength, field.exponent
             row["per_particle"] = field.per_particle
+        elif isinstance(field, SurfaceDrag):
+            row["kind"], row["flow"] = SURFACE_DRAG, field.flow
+            row["pressure"] = 0.5 * field.density * field.coefficient
+            row["tangential"] = 0.5 * field.density * field.friction
+            everyone = range(len(scene.bodies))
+            for i in everyone if field.body is None else [scene.body_index(field.body)]:
+                shape = scene.bodies[i].shape
+                points = surface_points(shape, field.points)
+                row["body"], row["unit_inertia"] = i, shape.inertia(1.0)[0]
+                row["first_point"], row["point_count"] = first, len(points.areas)
+                first += len(points.areas)
+                blocks.append(
+                    np.concatenate([points.positions.T, points.normals.T, [points.areas]])
+                )
+                rows.append(row.copy())
+            continue
         else:
             row["kind"], row["damping"], row["quadratic"] = DRAG, field.linear, field.quadratic
             if field.body is None:
@@ -38,4 +58,4 @@ def field_rows(scene: Scene) -> Array:
                 continue
             row["body"] = scene.body_index(field.body)
         rows.append(row)
-    return np.array(rows, dtype=FIELD)
+    return np.array(rows, dtype=FIELD), np.concatenate(blocks, axis=1)

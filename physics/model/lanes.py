@@ -32,6 +32,7 @@ def make_constants(features: Features):
                 model.joint_row,
                 model.grid,
                 model.grid_value,
+                model.surface_point,
             )
         return model
 

@@ -40,6 +40,7 @@ class HalfPair(NamedTuple):
         both_sampled: the other solid's samples are tested too, so each carries a share of the load.
         part: index into `Layout.parts` of the compound part whose surface it is, or -1.
         face_normals: see `distances.box_distance`.
+        inner: the samples are balls inside a cylinder, which touch where its rims don't.
     """
 
     owner: int
@@ -50,6 +51,7 @@ class HalfPair(NamedTuple):
     both_sampled: bool = False
     part: int = -1
     face_normals: bool = False
+    inner: bool = False
 
     @property
     def capacity(self) -> int:
@@ -198,10 +200,13 @@ def _half_pairs(
             surfaces = [(-1, b.shape.surface(rounding(b)))]
         least = b.shape.edge_radius if isinstance(b.shape, Mesh) else 0.0
         return [
-            HalfPair(owner, other, samples, surface, None, part=k, face_normals=face_normals)
-            for samples, face_normals in sample_sets(a, b, least)
+            HalfPair(
+                owner, other, samples, surface, None,
+                part=k, face_normals=flat, inner=isinstance(a.shape, Cylinder) and not flat,
+            )
+            for samples, flat in sample_sets(a, b, least)
             for k, surface in surfaces
-        ]
+        ]  # fmt: skip
 
     first_drive = len(scene.bodies)
     # the grip servo keeps the two fingers of a gripper apart

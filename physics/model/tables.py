@@ -163,8 +163,8 @@ GRID_TABLE = np.dtype(
     align=True,
 )
 
-# one row per field and, of a Drag on all bodies, per body
-POINT_SPRING, ATTRACTOR, DRAG = range(3)
+# one row per field and, of a Drag or SurfaceDrag on all bodies, per body
+POINT_SPRING, ATTRACTOR, DRAG, SURFACE_DRAG = range(4)
 FIELD = np.dtype(
     [
         ("kind", "i8"),
@@ -179,6 +179,12 @@ FIELD = np.dtype(
         ("strength", "f8"),  # m^(1 + exponent)/s^2
         ("exponent", "f8"),
         ("per_particle", "i8"),
+        ("first_point", "i8"),  # into Model.surface_point, of a surface drag, as all below
+        ("point_count", "i8"),
+        ("pressure", "f8"),  # kg/m^3, half the density times the coefficient
+        ("tangential", "f8"),  # kg/m^3, likewise of the friction
+        ("flow", "f8", (3,)),  # m/s
+        ("unit_inertia", "f8"),  # m^2, first moment of inertia over mass at size 1
     ],
     align=True,
 )
@@ -227,6 +233,7 @@ class Model(NamedTuple):
         joint_row: [r] of JOINT_ROW.
         grid: [g] of GRID_TABLE.
         grid_value: [n] m at size 1, of each grid the distances at its nodes, then surface points.
+        surface_point: [7, p] position x y z in m at size 1, normal x y z and area in m^2.
     """
 
     dynamic: Array
@@ -239,6 +246,7 @@ class Model(NamedTuple):
     joint_row: Array
     grid: Array
     grid_value: Array
+    surface_point: Array
 
     @property
     def nbytes(self) -> int:

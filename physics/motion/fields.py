@@ -10,15 +10,17 @@ An attractor pulls each point with its mass times strength / r^exponent. `per_pa
 body of mass m and principal moments J among six points at +-sqrt(3 s_i) along its principal axes,
 with s_i = (J_j + J_k - J_i) / (2 m), the mean of x_i^2. They have the body's mass, centre and
 inertia, so their force and torque are those of the body to second order in its size.
+
+A surface drag is summed over points of the body's surface, in the body frame.
 """
 
 import math
 
 from physics.compiler.jit import LANES, at, stage
 from physics.model.features import cached_by_features
-from physics.model.tables import ATTRACTOR, DRAG, POINT_SPRING
+from physics.model.tables import ATTRACTOR, DRAG, POINT_SPRING, SURFACE_DRAG
 from physics.motion.kinematics import make_angular_velocity
-from physics.motion.vectors import cross, rotated
+from physics.motion.vectors import cross, rotated, rotated_back
 
 
 @cached_by_features
@@ -164,9 +166,81 @@ def drag(row, workspace):
 
 
 @cached_by_features
+def make_surface_drag(features):
+    """Stage that adds a surface drag on a body."""
+    per_world_parameters = features.per_world_parameters
+
+    @stage
+    def size_of(row, constants, i):
+        """Factor on a body's lengths."""
+        size = 1.0
+        if per_world_parameters:
+            inertia, inverse_mass = at(constants.inertia[0], i), at(constants.inverse_mass, i)
+            size = math.sqrt(inertia * inverse_mass / row.unit_inertia)
+        return size
+
+    @stage
+    def surface_drag(row, model, workspace):
+        constants, solid, own = (
+            model.dynamic[row.body],
+            workspace.solid[row.body],
+            workspace.relative[0],  # scratch: velocities and sums in the body frame
+        )
+        R, v, omega = solid.rotation, solid.present_velocity, solid.present_angular_velocity
+        u, spin, force, torque = own.velocity, own.angular_velocity, own.force, own.torque
+        for i in range(LANES):
+            x, y, z = rotated_back(
+                R, i, v[0, i] - row.flow[0], v[1, i] - row.flow[1], v[2, i] - row.flow[2]
+            )
+            u[0, i] = x
+            u[1, i] = y
+            u[2, i] = z
+            x, y, z = rotated_back(R, i, omega[0, i], omega[1, i], omega[2, i])
+            size = size_of(row, constants, i)  # a point at size 1 gets the speed of the real one
+            spin[0, i] = size * x
+            spin[1, i] = size * y
+            spin[2, i] = size * z
+            for c in range(3):
+                force[c, i] = 0.0
+                torque[c, i] = 0.0
+        for p in range(row.first_point, row.first_point + row.point_count):
+            point = model.surface_point[:, p]
+            x, y, z, nx, ny, nz = point[0], point[1], point[2], point[3], point[4], point[5]
+            pressure, tangential = row.pressure * point[6], row.tangential * point[6]
+            for i in range(LANES):
+                ux, uy, uz = cross(spin[0, i], spin[1, i], spin[2, i], x, y, z)
+                ux, uy, uz = u[0, i] + ux, u[1, i] + uy, u[2, i] + uz
+                s = max(0.0, ux * nx + uy * ny + uz * nz)
+                along, across = -s * s * (pressure - tangential), -s * tangential
+                fx = along * nx + across * ux
+                fy = along * ny + across * uy
+                fz = along * nz + across * uz
+                force[0, i] += fx
+                force[1, i] += fy
+                force[2, i] += fz
+                torque[0, i] += y * fz - z * fy
+                torque[1, i] += z * fx - x * fz
+                torque[2, i] += x * fy - y * fx
+        for i in range(LANES):
+            size = size_of(row, constants, i)
+            area, arm = size * size, size * size * size
+            x, y, z = rotated(R, i, area * force[0, i], area * force[1, i], area * force[2, i])
+            solid.force[0, i] += x
+            solid.force[1, i] += y
+            solid.force[2, i] += z
+            x, y, z = rotated(R, i, arm * torque[0, i], arm * torque[1, i], arm * torque[2, i])
+            solid.torque[0, i] += x
+            solid.torque[1, i] += y
+            solid.torque[2, i] += z
+
+    return surface_drag
+
+
+@cached_by_features
 def make_fields(features):
     """Stage that adds the forces of all fields."""
-    fields = features.fields
+    fields, any_surface_drag = features.fields, features.surface_drag
+    surface_drag = make_surface_drag(features)
 
     @stage
     def add_fields(model, workspace):
@@ -179,6 +253,8 @@ def make_fields(features):
                     attractor(row, model, workspace)
                 elif row.kind == DRAG:
                     drag(row, workspace)
+                if any_surface_drag and row.kind == SURFACE_DRAG:
+                    surface_drag(row, model, workspace)
 
     return add_fields
 

@@ -7,9 +7,9 @@ Its core is a cylinder inset by the rounding, so its rims are rounded. It has tw
   at every angle, and rolls without the corners that fixed samples would give it. Eight samples lie
   on each rim. A face has the weight 1, a point of a rim 1/8 (as a corner of a box), and the side 1
   with the two rim points at its ends.
-- Elsewhere they are fixed: sixteen on each rim, and the largest balls that fit inside, in a row on
-  the axis of a cylinder that is longer than wide. A face has the weight 1, and so has the row with
-  one point of each rim.
+- Elsewhere they are fixed: sixteen on each rim, and balls of its radius, in a row on the axis of a
+  cylinder that is longer than wide. A face has the weight 1, and so has the row with one point of
+  each rim. The balls end below the faces by twice the rounding, so that they bear no face.
 """
 
 import math
@@ -23,8 +23,8 @@ from physics.scene.validation import positive
 
 Array = np.ndarray
 
-# samples of a rim, of those that turn and of the fixed ones. Multiples of four, so that they have the
-# extents of the circle along x and y
+# samples of a rim, of those that turn and of the fixed ones. Multiples of four: the samples have
+# the extents of the circle along x and y
 RIM_SAMPLES, FIXED_RIM_SAMPLES = 8, 16
 
 
@@ -95,7 +95,7 @@ class Cylinder:
         rims = [circle(FIXED_RIM_SAMPLES, radius, z) for z in (-end, end)]
         rim = 1.0 / FIXED_RIM_SAMPLES
         sets = [Samples(np.concatenate(rims), np.full(2 * FIXED_RIM_SAMPLES, rim), rounding)]
-        row = self.half_length - self.radius  # half its length
+        row = self.half_length - 2.0 * rounding - self.radius  # half its length
         if row > 0.0:
             count = max(1, math.ceil(2.0 * row / spacing - 1e-9)) + 1
             balls = np.zeros((count, 3))

@@ -1,11 +1,11 @@
-"""Forces on bodies other than contacts and gravity: springs to points, attractors and drag.
+"""Forces on bodies other than contacts and gravity: springs to points, attractors, drag.
 
 A body is named by its index or its name. `World.apply_wrench` gives any other force.
 """
 
 from dataclasses import dataclass
 
-from physics.scene.validation import ZERO, Vector, number, vector
+from physics.scene.validation import ZERO, Vector, integer, number, vector
 
 BodyName = int | str
 
@@ -124,4 +124,49 @@ class Drag:
             check_body("Drag.body", self.body)
 
 
-Field = PointSpring | Attractor | Drag
+@dataclass(frozen=True)
+class SurfaceDrag:
+    """Pressure and friction of a fluid, integrated over the surface points that face the flow.
+
+    A patch of area A with the outward normal n moves at u relative to the fluid. Only where
+    s = n . u is positive, the fluid that it meets, density * A * s in kg/s, loses a part of its
+    momentum:
+
+        force = -density/2 * A * s * (coefficient * s * n + friction * (u - s n))
+
+    A box that moves along a normal has the drag density/2 * coefficient * area * speed^2, a ball
+    half of that on its cross section. Parts of a body do not shade each other, and there is no lift
+    or suction from behind.
+
+    Args:
+        density: of the fluid, kg/m^3.
+        coefficient: of the pressure; 2 if the fluid loses all its momentum along the normal.
+        friction: of the tangential part; 2 if it loses all its momentum along the surface.
+        flow: velocity of the fluid, m/s: wind.
+        body: on which it acts, by index or name; None: each of them.
+        points: on the surface of a body, about. The force on a body that does not rotate is exact
+            for a box, and with 200 points within 0.2 % for the other shapes.
+
+    Raises:
+        TypeError, ValueError: a field is of the wrong type, negative or not finite.
+    """
+
+    density: float
+    coefficient: float
+    friction: float = 0.0
+    flow: Vector = ZERO
+    body: BodyName | None = None
+    points: int = 200
+
+    def __post_init__(self) -> None:
+        """Checks every field."""
+        for name in ("density", "coefficient", "friction"):
+            value = number(f"SurfaceDrag.{name}", getattr(self, name), low=0.0)
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "flow", vector("SurfaceDrag.flow", self.flow))
+        integer("SurfaceDrag.points", self.points, low=1)
+        if self.body is not None:
+            _check_body("SurfaceDrag.body", self.body)
+
+
+Field = PointSpring | Attractor | Drag | SurfaceDrag

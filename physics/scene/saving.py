@@ -29,7 +29,7 @@ def _plain(value: Any) -> Any:
         return value
     written = {f.name: getattr(value, f.name) for f in fields(value)}
     if written.get("density") is not None:  # a Body takes its mass or its density
-        del written["mass"]
+        written.pop("mass", None)
     return {"type": type(value).__name__, **{k: _plain(v) for k, v in written.items()}}
 
 

@@ -15,7 +15,7 @@ from physics.scene import saving
 from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive, Gripper
-from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring
+from physics.scene.fields import Attractor, BodyName, Drag, Field, PointSpring, SurfaceDrag
 from physics.scene.joints import BallJoint, Distance, Hinge, Joint, Motor, Slider, Weld
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
@@ -29,7 +29,7 @@ from physics.scene.validation import ZERO, Vector, instance, vector
 # classes of all objects that a scene is made of
 _PARTS = (
     Body, Ground, Static, Drive, Gripper, Material, PointSpring, Attractor, Drag,
-    Sphere, Box, Capsule, Compound, Part, Cylinder, Torus, Particles, Mesh,
+    SurfaceDrag, Sphere, Box, Capsule, Compound, Part, Cylinder, Torus, Particles, Mesh,
     BallJoint, Hinge, Slider, Weld, Distance, Motor,
 )  # fmt: skip
 
@@ -43,7 +43,7 @@ class Scene:
         statics: Ground or Static.
         drives: driven solids: Drive or Gripper.
         gravity: m/s^2.
-        fields: other forces on bodies: PointSpring, Attractor or Drag.
+        fields: other forces on bodies: PointSpring, Attractor, Drag or SurfaceDrag.
         joints: BallJoint, Hinge, Slider, Weld or Distance.
 
     Raises:
@@ -64,7 +64,7 @@ class Scene:
             "bodies": (Body,),
             "statics": (Ground, Static),
             "drives": (Drive, Gripper),
-            "fields": (PointSpring, Attractor, Drag),
+            "fields": (PointSpring, Attractor, Drag, SurfaceDrag),
             "joints": (BallJoint, Hinge, Slider, Weld, Distance),
         }
         for name, types in kinds.items():
