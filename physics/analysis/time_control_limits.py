@@ -6,7 +6,10 @@ from physics.model.features import FIXED, Features
 from physics.model.tables import Model
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
-from physics.scene.shapes import GRID
+from physics.scene.shapes import GRID, PARTICLES, TORUS
+
+# kinds of surface whose distance has no tangent that bounds it
+_CONCAVE = {GRID: "a mesh", TORUS: "a torus", PARTICLES: "a solid of particles"}
 
 
 def check_time_control(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
@@ -26,12 +29,13 @@ def check_time_control(scene: Scene, fidelity: Fidelity, model: Model, features:
         )
     if not features.finds_impacts:
         return
-    concave = np.flatnonzero(model.half_pair["kind"] == GRID)
+    concave = np.flatnonzero(np.isin(model.half_pair["kind"], list(_CONCAVE)))
     if len(concave):
-        name = scene.solid_names[model.half_pair["surface"][concave[0]]]
+        row = model.half_pair[concave[0]]
         raise ValueError(
             f"{problem} needs convex surfaces, because their tangents bound the distance; "
-            f"{name} is a mesh: use time_control='adaptive' or 'fixed'"
+            f"{scene.solid_names[row['surface']]} is {_CONCAVE[int(row['kind'])]}: use "
+            "time_control='adaptive' or 'fixed'"
         )
     k = int(np.argmin(model.half_pair["skin"]))
     largest = 0.5 * float(model.half_pair["skin"][k])

@@ -9,7 +9,7 @@ import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.collision.distances import core_distance
-from physics.collision.facing import facing
+from physics.collision.facing import FLOORS, facing
 from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
@@ -77,7 +77,7 @@ def make_list_samples(features):
     distance = by_surface_kind(
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
     )
-    turn = by_surface_kind(features, lambda kind: None if kind == PARTICLES else facing(kind))
+    turn = by_surface_kind(features, lambda kind: facing(kind) if kind in FLOORS else None)
 
     @stage
     def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):

@@ -16,7 +16,7 @@ from physics.collision.distances import (
     sphere_distance,
     torus_distance,
 )
-from physics.collision.facing import facing
+from physics.collision.facing import FLOORS, facing
 from physics.compiler.jit import stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
@@ -37,7 +37,7 @@ def make_touch(features, kind):
     compound, remembered_face = features.compound, contact_memory(features).face
     cylinder = kind == CYLINDER
     surface_distance = {CAPSULE: capsule_distance, TORUS: torus_distance}.get(kind, sphere_distance)
-    turn, turns = facing(kind), features.axial and kind != PARTICLES
+    turn, turns = facing(kind), features.axial and kind in FLOORS
 
     @stage
     def touch(row, i, R, c, ca, cb, cc, radius, owner_radius, overlap_share, face_normals, axial):

@@ -24,7 +24,10 @@ import math
 
 from physics.collision.distances import core_distance
 from physics.compiler.jit import stage
-from physics.scene.shapes import PLANE
+from physics.scene.shapes import BOX, PLANE
+
+# kinds of surface over which samples turn
+FLOORS = (PLANE, BOX)
 
 # rad. It displaces the lowest point of a circle that is tilted by more by _BIAS / tilt rad at most
 _BIAS = 1e-6
@@ -48,11 +51,10 @@ def _over_plane(x, y, z, R, c, i, ca, cb, cc):
 
 
 def facing(kind):
-    """Stage that turns a sample x y z of an axial solid towards one kind of surface.
+    """Stage that turns a sample x y z of an axial solid towards one of the `FLOORS`.
 
     Its arguments: the sample in the solid's frame in m; the solid's rotation R and position c
     relative to the surface; the lane; the parameters of the surface's core. It returns x and y.
-    Axial solids have no samples against particles.
     """
     if kind == PLANE:
         return _over_plane

@@ -1,7 +1,7 @@
 """Separations between the samples of a half-pair and its surface, in one lane, for a search."""
 
 from physics.collision.distances import core_distance
-from physics.collision.facing import facing
+from physics.collision.facing import FLOORS, facing
 from physics.collision.grid_distance import grid_separations
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import at, stage
@@ -41,7 +41,8 @@ def make_separations(features):
             return None
         if kind == GRID:
             return grid_separations
-        distance, turn = core_distance(kind), facing(kind)
+        distance = core_distance(kind)
+        turn, turned = facing(kind), axial and kind in FLOORS
 
         @stage
         def loop(model, half_pair, i, relative, separation):
@@ -61,7 +62,7 @@ def make_separations(features):
                 sx, sy, sz = along_x[s], along_y[s], along_z[s]
                 if per_world_parameters:
                     sx, sy, sz = size * sx, size * sy, size * sz
-                if axial:
+                if turned:
                     tx, ty = turn(sx, sy, sz, R, c, i, ca, cb, cc)
                     sx, sy = tx if turns else sx, ty if turns else sy
                 x = xx * sx + xy * sy + xz * sz + x0

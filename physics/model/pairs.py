@@ -14,7 +14,7 @@ from physics.model.rocking import fastest_modes, rocking_leverage
 from physics.scene.compound import Compound, SampleSet
 from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive
-from physics.scene.fidelity import Fidelity
+from physics.scene.fidelity import FIND_IMPACTS, Fidelity
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
@@ -135,12 +135,15 @@ def _single(shape: Shape) -> Shape:
     return shape if only is None else only
 
 
-def is_floor(solid: Solid, shape: Shape) -> bool:
+def is_floor(solid: Solid, shape: Shape, fidelity: Fidelity) -> bool:
     """Whether the samples of a cylinder or torus turn over a solid.
 
     Over a ground; and over a static box of which two sides are at least twice as long as the shape,
-    so that the shape is rarely beyond the border of the face that it is on.
+    so that the shape is rarely beyond the border of the face that it is on. Not where times of
+    impact are sought: the bound on the motion of a sample holds for one that is fixed to its solid.
     """
+    if fidelity.time_control in FIND_IMPACTS:
+        return False
     if isinstance(solid, Static) and isinstance(solid.shape, Box):
         return sorted(solid.shape.half_extents)[1] >= 2.0 * shape.reach
     return isinstance(solid, Ground)
@@ -178,7 +181,7 @@ def _half_pairs(
         if isinstance(shape, Compound):
             return shape.sample_sets(distance, inset)
         samples: tuple[Samples, ...]
-        if isinstance(shape, Cylinder | Torus) and not is_floor(other, shape):
+        if isinstance(shape, Cylinder | Torus) and not is_floor(other, shape, fidelity):
             samples = shape.fixed_samples(distance, inset)
         else:
             samples = (shape.samples(distance, inset),)

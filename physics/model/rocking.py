@@ -111,7 +111,8 @@ def _leverage_of_samples(positions: Array, weights: Array, radii: float | Array)
 
 def _leverage_of_mesh(mesh: Mesh) -> float:
     """The least leverage of the flat sides of a mesh; 0 without any: it rolls."""
-    positions, weights, _ = mesh.samples(0.5 * mesh.width, 0.0)
+    samples = mesh.samples(0.5 * mesh.width, 0.0)
+    positions, weights = samples.positions, samples.weights
     found, least = [], (1e-6 * np.abs(positions).max()) ** 2
     for normal in mesh.sides():
         height = positions @ normal

@@ -15,7 +15,7 @@ INTEGRATORS = ("midpoint", "euler", "rk4", "adaptive")
 
 _TOLERANCE = 1e-6  # 1/s, of the adaptive integrator
 TIME_CONTROLS = ("fixed", "adaptive", "bisection", "advancement", "swept")
-_FIND_IMPACTS = ("bisection", "advancement", "swept")
+FIND_IMPACTS = ("bisection", "advancement", "swept")
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Fidelity:
                 f"Fidelity.time_control {self.time_control!r} requires integrator='midpoint', got "
                 f"{self.integrator!r}: it divides that integrator's steps"
             )
-        if self.time_control not in _FIND_IMPACTS:
+        if self.time_control not in FIND_IMPACTS:
             return
         for name, only, why in (
             ("law", "impulse", "springs resolve a collision over many steps, at no single time"),

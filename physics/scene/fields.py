@@ -166,7 +166,7 @@ class SurfaceDrag:
         object.__setattr__(self, "flow", vector("SurfaceDrag.flow", self.flow))
         integer("SurfaceDrag.points", self.points, low=1)
         if self.body is not None:
-            _check_body("SurfaceDrag.body", self.body)
+            check_body("SurfaceDrag.body", self.body)
 
 
 Field = PointSpring | Attractor | Drag | SurfaceDrag

@@ -3,7 +3,8 @@
 Solids of revolution: Gauss points along the profile, or evenly spaced ones on a closed profile,
 times evenly spaced angles. Boxes: Gauss points on each face. So the integral of a polynomial of low
 degree is exact; that of a function that is cut off where a face turns away from the flow converges.
-A compound, and particles, have the points of their parts without those inside of other parts.
+A compound, and particles, have the points of their parts without those inside of other parts. A
+mesh has the centres of its triangles, the larger of which are divided.
 """
 
 import math
@@ -14,6 +15,7 @@ import numpy as np
 
 from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder
+from physics.scene.mesh import Mesh
 from physics.scene.part import Part
 from physics.scene.particles import Particles
 from physics.scene.shapes import Box, Capsule, Shape, Sphere
@@ -193,6 +195,32 @@ def _particles(shape: Particles, count: int) -> SurfacePoints:
     return _joined(found)
 
 
+def _mesh(shape: Mesh, count: int) -> SurfacePoints:
+    corners = shape.triangles
+    largest = float(np.linalg.norm(_area_vectors(corners), axis=1).sum()) / count
+    while True:
+        areas = np.linalg.norm(_area_vectors(corners), axis=1)
+        large = areas > largest * (1.0 + 1e-9)
+        if not large.any():
+            break
+        whole = corners[large]
+        middles = 0.5 * (whole + np.roll(whole, -1, axis=1))  # of the edges that begin at a corner
+        tips = [np.stack([whole[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+        corners = np.concatenate([corners[~large], middles, *tips])
+    vectors = _area_vectors(corners)
+    areas = np.linalg.norm(vectors, axis=1)
+    solid = areas > 0.0
+    return SurfacePoints(
+        corners[solid].mean(axis=1), vectors[solid] / areas[solid, None], areas[solid]
+    )
+
+
+def _area_vectors(corners: Array) -> Array:
+    """Outward normals [n, 3] of triangles [n, 3, 3], with the area in m^2 as their length."""
+    first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
+    return 0.5 * np.cross(second - first, third - first)
+
+
 def _joined(parts: list[SurfacePoints]) -> SurfacePoints:
     """All points in one."""
     return SurfacePoints(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
@@ -206,4 +234,5 @@ _MAKERS: dict[type, Callable[[Any, int], SurfacePoints]] = {
     Torus: _torus,
     Compound: _compound,
     Particles: _particles,
+    Mesh: _mesh,
 }

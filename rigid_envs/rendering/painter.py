@@ -16,6 +16,7 @@ Points = list[list[int]]  # [n, 2] pixels
 
 GLOSS = 0.4  # strength of the highlight on round solids
 CAPSULE_STRIPS = 32  # flat strips that make up the visible half of a tube
+CYLINDER_STRIPS = 64  # those of a whole one
 BALL_SIZE = 128  # pixels of the picture that all balls of a colour are scaled from
 GHOST_FILL, FAINT_FILL, FAINT_EDGE = 70, 60, 110  # opacity of 255
 EDGE = 0.72  # brightness of a box's edges, as a share of its faces'
@@ -81,7 +82,10 @@ class Painter:
             if nearest[i] < self._camera.near:
                 continue
             balls = particles[i] if i < len(particles) else None
-            if solids.radius[i] == 0.0:
+            if solids.cylinder[i]:
+                if balls is None:
+                    self._draw_cylinder(solids, i, colors[i])
+            elif solids.radius[i] == 0.0:
                 parts = {face: [corners[i][k] for k in FACES[face][2]] for face in seen[i]}
                 if balls is not None:
                     self.glass(colors[i], list(parts.values()), FAINT_FILL, FAINT_EDGE)
@@ -180,6 +184,26 @@ class Painter:
         near, far = points
         for k, paint in enumerate(colors):
             self.polygon(paint, [near[k], near[k + 1], far[k + 1], far[k]])
+
+    def _draw_cylinder(self, solids: Solids, i: int, color: Color) -> None:
+        """Draw the strips and the end that face the camera, of which no two overlap."""
+        axes, half, to_eye = solids.axes[i], solids.half[i], -self._camera.axes[2]
+        eye = (self._camera.eye - solids.centre[i]) @ axes
+        turn = np.linspace(0.0, 2.0 * np.pi, 2 * CYLINDER_STRIPS + 1)
+        normals = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=-1)
+        rims = np.array([half * (1.0, 1.0, side) for side in (-1.0, 1.0)])[:, None]
+        circles = normals[::2] * half[0] + rims * (0.0, 0.0, 1.0)
+        pixels, _ = self.project(solids.centre[i] + circles @ axes.T)
+        low, high = whole(pixels)
+        paints = shade(color, normals[1::2] @ axes.T, to_eye, GLOSS).astype(int).tolist()
+        for k in np.flatnonzero(normals[1::2] @ eye > half[0]).tolist():
+            self.polygon(paints[k], [low[k], low[k + 1], high[k + 1], high[k]])
+        if abs(eye[2]) > half[2]:
+            side = math.copysign(1.0, float(eye[2]))
+            paint = shade(color, side * axes[:, 2], to_eye, 0.0)
+            end = (high if side > 0.0 else low)[:-1]
+            self.polygon(paint.astype(int).tolist(), end)
+            self.polygon((EDGE * paint).astype(int).tolist(), end, self._fineness)
 
 
 def whole(pixels: Array) -> Any:

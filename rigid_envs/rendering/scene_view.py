@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics import Box, Compound, Gripper, Mesh, Part, Sphere, Static
+from physics import Box, Compound, Cylinder, Gripper, Mesh, Part, Sphere, Static, Torus
+from physics import Particles as ParticleShape
 from physics.rotation import multiply, rotate
 from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
 
@@ -57,12 +58,23 @@ def _solid(
 ) -> list[Item]:
     """A solid as an item; a compound as one for each part, each with the balls nearest to it.
 
-    A mesh is a box of faint lines around balls along its surface.
+    A mesh is a box of faint lines around balls along its surface, particles are one around them; a
+    torus is a ring of balls.
     """
+    if isinstance(shape, Torus):
+        ring = shape.particles(0.25 * shape.minor_radius)
+        disc = Cylinder(shape.reach, shape.minor_radius)
+        drawn = balls or Particles(ring.positions, ring.radius)
+        return [Item(disc, position, orientation, color, drawn)]
+    if isinstance(shape, ParticleShape):
+        half = np.abs(shape.points).max(axis=0) + shape.radius
+        drawn = Particles(shape.points, shape.radius)
+        return [Item(Box(tuple(half)), position, orientation, color, drawn)]
     if isinstance(shape, Mesh):
-        positions, _, radius = shape.samples(shape.width / 8.0, shape.width / 16.0)
+        samples = shape.samples(shape.width / 8.0, shape.width / 16.0)
+        drawn = balls or Particles(samples.positions, samples.radius)
         box = Box(shape.surface(0.0).parameters)
-        return [Item(box, position, orientation, color, balls or Particles(positions, radius))]
+        return [Item(box, position, orientation, color, drawn)]
     if not isinstance(shape, Compound):
         return [Item(shape, position, orientation, color, balls)]
     found, nearest = [], np.zeros(0)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from physics import Cylinder
 from physics.rotation import rotation_matrix
 from rigid_envs.rendering.view import TO_LIGHT, Goal, Item
 
@@ -43,8 +44,10 @@ class Solids:
     Attributes:
         centre: [n, 3] m.
         axes: [n, 3, 3], columns are the body's axes in the world.
-        half: [n, 3] m, half extents of the core; zero for a ball, along z for a capsule.
-        radius: [n] m, by which the core is rounded; zero for a box.
+        half: [n, 3] m, half extents of the core; zero for a ball, along z for a capsule; of a
+            cylinder those of the box around it.
+        radius: [n] m, by which the core is rounded; zero for a box or cylinder.
+        cylinder: [n], whether the core is round about z.
         corners: [n, 8, 3] m, of the core, in the order of `_SIGNS`.
     """
 
@@ -55,10 +58,15 @@ class Solids:
         self.centre = np.array(centres).reshape(count, 3)
         self.axes = rotation_matrix(np.array(turns).reshape(count, 4))
         self.half, self.radius = np.zeros((count, 3)), np.zeros(count)
+        self.cylinder = np.zeros(count, dtype=bool)
         for i, item in enumerate(items):
             self.half[i] = getattr(item.shape, "half_extents", 0.0)
             self.half[i, 2] += getattr(item.shape, "half_length", 0.0)
-            self.radius[i] = getattr(item.shape, "radius", 0.0)
+            radius = getattr(item.shape, "radius", 0.0)
+            if isinstance(item.shape, Cylinder):
+                self.half[i, :2], self.cylinder[i] = radius, True
+            else:
+                self.radius[i] = radius
         self.radius[len(items) :] = [min(ball.radius, ball.position[2]) for ball in balls]
         self.corners = box_corners(self.centre, self.axes, self.half)
 
@@ -77,10 +85,14 @@ class Solids:
         """
         axes, half, radius = self.axes[:count], self.half[:count], self.radius[:count]
         ways = CIRCLE @ across
-        signs = np.sign(np.einsum("kj,nji->nki", ways, axes))
+        local = np.einsum("kj,nji->nki", ways, axes)
+        signs, round_ = np.sign(local), self.cylinder[:count]
+        across_z = np.maximum(np.linalg.norm(local[round_, :, :2], axis=2, keepdims=True), 1e-9)
+        signs[round_, :, :2] = local[round_, :, :2] / across_z
         core = np.einsum("nij,nkj,nj->nki", axes, signs, half)
         points = self.centre[:count, None] + core + radius[:, None, None] * ways
-        kept = (signs != np.roll(signs, 1, axis=1)).any(axis=2) | (radius > 0.0)[:, None]
+        smooth = (radius > 0.0) | round_
+        kept = (signs != np.roll(signs, 1, axis=1)).any(axis=2) | smooth[:, None]
         return points[kept], np.cumsum(kept.sum(axis=1)).tolist()
 
     def in_front(self, pairs: Array, eye: Array) -> Array:

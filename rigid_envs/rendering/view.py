@@ -34,7 +34,7 @@ class Item:
     """A solid to draw.
 
     Attributes:
-        shape: a Sphere, Box or Capsule of `physics`.
+        shape: a Sphere, Box, Capsule or Cylinder of `physics`.
         position: (3,) m.
         orientation: (4,) quaternion x, y, z, w.
         color: red, green, blue in 0..255.
@@ -54,8 +54,10 @@ class Item:
     def __post_init__(self) -> None:
         """Checks all values and makes the quaternion one of unit length."""
         kind = type(self.shape).__name__
-        if kind not in ("Sphere", "Box", "Capsule"):
-            raise TypeError(f"Item.shape must be a Sphere, Box or Capsule to be drawn, got {kind}")
+        if kind not in ("Sphere", "Box", "Capsule", "Cylinder"):
+            raise TypeError(
+                f"Item.shape must be a Sphere, Box, Capsule or Cylinder to be drawn, got {kind}"
+            )
         turn = unit_quaternion("Item.orientation", self.orientation)
         object.__setattr__(self, "position", np.array(vector("Item.position", self.position)))
         object.__setattr__(self, "orientation", np.array(turn))

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
+from physics import Particles as ParticleShape
+from physics import Torus
+from physics.scene.cylinder import Cylinder
 from physics.scene.shapes import Box, Capsule, Sphere
 from rigid_envs.rendering.renderer import (
     TO_LIGHT,
@@ -24,6 +27,8 @@ from rigid_envs.rendering.renderer import (
     Renderer,
     grid,
 )
+from rigid_envs.rendering.scene_view import _solid
+from rigid_envs.rendering.solids import Solids
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 RED, GREEN, BLUE = (220, 40, 40), (40, 180, 60), (40, 60, 220)
@@ -91,7 +96,9 @@ def test_from_above_the_picture_is_a_map_with_x_right_and_y_up():
 
 @pytest.mark.parametrize("position", [(0.0, 0.0, 0.02), (0.12, 0.1, 0.02), (-0.15, -0.1, 0.1)])
 @pytest.mark.parametrize(
-    "shape", [Sphere(0.02), CUBE, Capsule(0.02, 0.03)], ids=lambda shape: type(shape).__name__
+    "shape",
+    [Sphere(0.02), CUBE, Capsule(0.02, 0.03), Cylinder(0.02, 0.02)],
+    ids=lambda shape: type(shape).__name__,
 )
 def test_a_solid_shows_its_colour_at_the_pixel_of_its_centre(shape, position):
     assert shows(draw(item(shape, position)), pixel_of(position), RED)
@@ -125,6 +132,44 @@ def test_a_capsule_reaches_from_cap_to_cap_along_its_own_z():
     assert shows(frame, pixel_of((0.07, 0.0, 0.015)), RED)
     assert shows(frame, pixel_of((-0.07, 0.0, 0.015)), RED)
     assert not shows(frame, pixel_of((0.09, 0.0, 0.015)), RED)
+
+
+def test_a_cylinder_fills_its_round_outline_and_not_the_box_around_it():
+    frame = draw(item(Cylinder(0.06, 0.01), (0.0, 0.0, 0.01)))
+    for angle in np.arange(8) * np.pi / 4:
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        top = np.array([0.0, 0.0, 0.02])
+        assert shows(frame, pixel_of(top + 0.93 * 0.06 * way), RED)
+        assert not shows(frame, pixel_of((0.0, 0.0, 0.01) + 1.25 * 0.06 * way), RED)
+    half = np.sin(np.pi / 4)
+    lying_along_x = (0.0, half, 0.0, half)
+    frame = draw(item(Cylinder(0.015, 0.06), (0.0, 0.0, 0.015), orientation=lying_along_x))
+    assert shows(frame, pixel_of((0.055, 0.0, 0.025)), RED)
+    assert not shows(frame, pixel_of((0.068, 0.0, 0.015)), RED)
+
+
+def test_a_cylinder_has_a_shadow_as_round_as_itself():
+    """Seen along its axis its outline is a circle, seen across it a rectangle."""
+    disc = item(Cylinder(0.06, 0.01), (0.0, 0.0, 0.01))
+    solids = Solids([disc], [])
+    points, _ = solids.outlines(np.eye(3)[:2], 1)
+    np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), 0.06)
+    points, _ = solids.outlines(np.eye(3)[1:], 1)
+    np.testing.assert_allclose(np.abs(points[:, 1]).max(), 0.06)
+    np.testing.assert_allclose(np.ptp(points[:, 2]), 0.02)
+
+
+def test_a_torus_is_a_ring_with_a_hole_and_particles_are_balls():
+    at = np.array((0.0, 0.0, 0.02))
+    (ring,) = _solid(Torus(0.05, 0.015), at, np.array(UPRIGHT), RED, None)
+    frame = draw(ring)
+    assert not shows(frame, pixel_of((0.0, 0.0, 0.0)), RED)
+    for angle in np.arange(8) * np.pi / 4:
+        assert shows(frame, pixel_of((0.05 * np.cos(angle), 0.05 * np.sin(angle), 0.03)), RED)
+    pair = ParticleShape([(-0.05, 0.0, 0.0), (0.05, 0.0, 0.0)], 0.02)
+    (balls,) = _solid(pair, at, np.array(UPRIGHT), RED, None)
+    np.testing.assert_array_equal(balls.particles.positions, pair.points)
+    np.testing.assert_allclose(balls.shape.half_extents, (0.07, 0.02, 0.02))
 
 
 @pytest.mark.parametrize("first", [0, 1])
@@ -338,7 +383,7 @@ def test_a_shape_that_cannot_be_drawn_is_named():
     class Torus:
         radius: float
 
-    with pytest.raises(TypeError, match="Sphere, Box or Capsule to be drawn, got Torus"):
+    with pytest.raises(TypeError, match="Box, Capsule or Cylinder to be drawn, got Torus"):
         item(Torus(0.1), (0.0, 0.0, 0.0))
 
 
