@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.directions import spread_directions
 from physics.meshes.distance_grid import DistanceGrid, distance_grid
 from physics.meshes.properties import principal_axes, properties
 from physics.meshes.read import merged
 from physics.meshes.samples import inset, surface_points
-from physics.meshes.sides import directions, flat_sides, weights
+from physics.meshes.sides import flat_sides, weights
 
 Array = np.ndarray
 Rows = tuple[tuple[float, ...], ...]
@@ -80,7 +81,7 @@ def _normals(vertices: Array, faces: Array) -> tuple[Array, Array]:
 def _width(vertices: Array, faces: Array) -> float:
     normals, area = _normals(vertices, faces)
     largest = normals[np.argsort(-area)[:_DIRECTIONS]]
-    heights = vertices @ np.concatenate([largest, directions(_DIRECTIONS)]).T
+    heights = vertices @ np.concatenate([largest, spread_directions(_DIRECTIONS)]).T
     return float((heights.max(axis=0) - heights.min(axis=0)).min())
 
 

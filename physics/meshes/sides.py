@@ -9,9 +9,9 @@ several sides has the least of its weights, so no side has more than 1. A sample
 supports all of the load: then a solid with round sides sinks as deep as a ball.
 """
 
-import math
-
 import numpy as np
+
+from physics.directions import spread_directions
 
 Array = np.ndarray
 
@@ -21,14 +21,6 @@ _DIRECTIONS = 400
 _BLOCKS = 20
 # of a solid's reach, below which a height over a side is round-off
 _SAME = 1e-6
-
-
-def directions(count: int) -> Array:
-    """Unit vectors [count, 3] spread evenly over all directions (Fibonacci sphere)."""
-    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
 def _first_touched(below: Array, along: Array, same: float) -> Array:
@@ -78,7 +70,7 @@ def sides(points: Array) -> Array:
     if len(points) < 3:
         return np.zeros((0, 3))
     same = _SAME * float(np.abs(points).max())
-    blocks = np.array_split(directions(_DIRECTIONS), _BLOCKS)
+    blocks = np.array_split(spread_directions(_DIRECTIONS), _BLOCKS)
     normals = np.concatenate([_rolled(points, block, same) for block in blocks])
     alike = normals @ normals.T > 1.0 - _SAME
     return np.asarray(normals[np.unique(np.argmax(alike, axis=1))])

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.scene.directions import spread_directions
+from physics.directions import spread_directions
 from physics.scene.mass import MassProperties, combine
 from physics.scene.part import Part, Simple
 from physics.scene.principal_axes import check_principal_axes

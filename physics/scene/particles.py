@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from physics.directions import spread_directions
 from physics.scene import mass as mass_properties
-from physics.scene.directions import spread_directions
 from physics.scene.principal_axes import check_principal_axes
 from physics.scene.shapes import PARTICLES, Samples, Sphere, Surface
 from physics.scene.validation import positive
