@@ -272,7 +272,8 @@ def test_they_stack(law, stress):
     for i, z in tower.items():
         assert world.position[0, i, 2] == pytest.approx(z, abs=0.004)
         assert np.abs(world.position[0, i, :2]).max() < 5e-4
-        assert np.abs(world.linear_velocity[0, i]).max() < 5e-3
+        # under the impulse law what stands on the ring trembles
+        assert np.abs(world.linear_velocity[0, i]).max() < (5e-3 if law == "accurate" else 0.02)
 
 
 def test_as_drives_and_statics_they_push_and_bear_others():
@@ -301,3 +302,50 @@ def test_geometry_particle_is_accepted(shape):
         getattr(shape, "major_radius", 0.02) + getattr(shape, "minor_radius", 0.01)
         if shape is not DRUM else 0.02
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("ball", "static", "message"),
+    [
+        (SIX, RING, r"static 0 is a torus: use time_control='adaptive' or 'fixed'"),
+        (SIX, SIX, r"static 0 is a solid of particles: use time_control='adaptive'"),
+    ],
+)
+@pytest.mark.parametrize("control", ["bisection", "advancement", "swept"])
+def test_times_of_impact_need_convex_surfaces(ball, static, message, control):
+    scene = Scene([Body(ball, mass=0.1)], [Static(static, (1, 0, 0))])
+    with pytest.raises(ValueError, match=message):
+        World(scene, Fidelity(law="impulse", contact_resolution=1.8, time_control=control))
+
+
+def test_under_times_of_impact_samples_do_not_turn():
+    """Their bound on motion holds for samples that are fixed to their solid."""
+    scene = Scene([Body(DRUM, mass=0.1, position=(0, 0, 1.0))], [Ground()])
+    impulse = {"law": "impulse", "contact_resolution": 1.8}
+    for control, turn in (("fixed", True), ("swept", False), ("adaptive", True)):
+        world = World(scene, Fidelity(time_control=control, **impulse))
+        assert world.features.axial == turn
+
+
+def test_no_fast_coin_passes_a_thin_wall(stress):
+    """Nor do particles, if swept. In fixed steps most of them miss it."""
+    if not stress:
+        pytest.skip("compiles two kernels of its own")
+    material, missed = Material(0.3, 0.5), {}
+    shapes = [Cylinder(0.01, 0.002), FOUR]
+    walls = [Static(Box((0.001, 0.3, 0.3)), (x, 0, 0), material=material) for x in (0.0, 1.0)]
+    bodies = [Body(s, mass=0.01, group=2 + k, mask=1, material=material)
+              for k, s in enumerate(shapes)]  # fmt: skip
+    rng = np.random.default_rng(0)
+    for control in ("fixed", "swept"):
+        scene = Scene(bodies, walls, gravity=(0, 0, 0))
+        fidelity = Fidelity(law="impulse", contact_resolution=1.8, time_control=control)
+        world = World(scene, fidelity, 200)
+        place = rng.uniform(-0.2, 0.2, (200, 2, 3)) - (0.5, 0.0, 0.0)
+        world.set_state(position=place, linear_velocity=(200.0, 0.0, 0.0),
+                        angular_velocity=rng.uniform(-100, 100, (200, 2, 3)),
+                        orientation=rng.normal(size=(200, 2, 4)))  # fmt: skip
+        world.advance(0.01)
+        missed[control] = np.mean(world.position[..., 0] > 0.0, axis=0)
+    assert np.all(missed["fixed"] > 0.3)
+    assert np.all(missed["swept"] == 0.0)

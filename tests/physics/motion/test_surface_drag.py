@@ -12,6 +12,7 @@ from physics import (
     Compound,
     Cylinder,
     Fidelity,
+    Mesh,
     Particles,
     Scene,
     Sphere,
@@ -19,6 +20,7 @@ from physics import (
     Torus,
     World,
 )
+from physics.reference import meshes
 from physics.scene.surface_points import surface_points
 
 RHO, C, G = 1.2, 1.5, 9.81
@@ -83,6 +85,37 @@ def test_the_points_of_a_compound_and_of_particles_are_those_outside():
     r, d = 0.1, 0.12
     pair = surface_points(Particles([(-d / 2, 0, 0), (d / 2, 0, 0)], r), 20000)
     assert pair.areas.sum() == pytest.approx(2 * 2 * math.pi * r * (r + d / 2), rel=5e-3)
+
+
+def test_the_points_of_a_mesh_are_spread_over_its_triangles():
+    box = Box((0.1, 0.07, 0.03))
+    vertices, faces = meshes.cuboid(box.half_extents)
+    points = surface_points(Mesh(vertices=vertices, faces=faces), 400)
+    assert len(points.areas) > 400
+    assert points.areas.max() <= 8 * (0.007 + 0.0021 + 0.003) / 400 * (1 + 1e-6)
+    assert points.areas.sum() == pytest.approx(8 * (0.007 + 0.0021 + 0.003), rel=1e-12)
+    flux = points.areas @ np.sum(points.positions * points.normals, axis=1)
+    assert flux / 3.0 == pytest.approx(box.volume, rel=1e-12)
+    way = np.array((0.3, -0.5, 0.7))
+    exact = pressure(surface_points(box, 50), way, 0.0 * way)[:3]
+    found = pressure(points, way, 0.0 * way)[:3]
+    np.testing.assert_allclose(np.sort(np.abs(found)), np.sort(np.abs(exact)), rtol=1e-12)
+
+
+def test_runge_kutta_has_its_order(stress):
+    """As long as no point turns towards the flow or away from it: a box that falls flat."""
+    if not stress:
+        pytest.skip("compiles a kernel of its own")
+    errors, fastest = [], math.sqrt(2.0 * 0.05 * G / (RHO * C * 4 * 0.1 * 0.07))
+    for h in (0.1, 0.05, 0.025):
+        far = Body(Box((0.1, 0.2, 0.3)), position=(0, 0, 99.0), mask=0)
+        body = Body(SHAPES["box"][0], mass=0.05, mask=0)
+        scene = Scene([body, far], gravity=(0, 0, -G), fields=[SurfaceDrag(RHO, C, body=0)])
+        world = World(scene, Fidelity(substep=h, integrator="rk4"))
+        world.advance(0.8)
+        expected = fastest * math.tanh(G * 0.8 / fastest)
+        errors.append(abs(-float(world.linear_velocity[0, 0, 2]) - expected))
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 4.0, atol=0.3)
 
 
 def test_a_shape_without_points_is_refused():
