@@ -101,7 +101,7 @@ def test_particles_of_a_box_fill_it_exactly():
         faces=meshes.cuboid((0.02, 0.03, 0.05))[1],
         fill="solid",
     )
-    positions, weights, radius = mesh.particles(0.01)
+    positions, weights, radius, _ = mesh.particles(0.01)
     assert len(positions) == 4 * 6 * 10
     assert radius == pytest.approx(0.005)
     np.testing.assert_allclose(positions.max(axis=0) + radius, (0.02, 0.03, 0.05))

@@ -30,7 +30,7 @@ def test_a_meshed_cube_has_the_samples_and_weights_of_a_box(spacing):
 @pytest.mark.parametrize("name", ["bowl", "knight"])
 def test_each_flat_side_of_a_mesh_has_weight_one_at_every_spacing(name, spacing):
     mesh = mesh_of(meshes.SHAPES[name]())
-    positions, shares, _ = mesh.samples(spacing, 0.0)
+    positions, shares, *_ = mesh.samples(spacing, 0.0)
     assert len(mesh.sides()) >= 1
     for normal in mesh.sides():
         height = positions @ normal
@@ -64,7 +64,7 @@ def test_no_point_of_a_round_mesh_is_farther_from_a_sample_than_the_spacing_allo
 
 
 def test_samples_of_a_round_mesh_touch_its_surface_from_inside():
-    positions, _, radius = mesh_of(meshes.ball(0.02, 48)).samples(0.01, 2e-3)
+    positions, _, radius, _ = mesh_of(meshes.ball(0.02, 48)).samples(0.01, 2e-3)
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1) + radius, 0.02, rtol=2e-3)
 
 

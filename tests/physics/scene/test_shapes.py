@@ -24,7 +24,7 @@ def test_every_shape_keeps_the_protocol(shape):
 @pytest.mark.parametrize("spacing", SPACINGS)
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_samples_of_a_box_lie_on_the_edges_of_its_core(box, spacing):
-    points, _, radius = samples_of(box, spacing, 1e-3)
+    points, _, radius, _ = samples_of(box, spacing, 1e-3)
     core = np.array(box.half_extents) - 1e-3
     assert radius == 1e-3
     on_face = np.isclose(np.abs(points), core)
@@ -48,7 +48,7 @@ def test_neighbours_along_an_edge_are_no_further_apart_than_the_spacing(box, spa
 @pytest.mark.parametrize("spacing", SPACINGS)
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_every_face_of_a_box_has_weight_one(box, spacing):
-    points, weights, _ = samples_of(box, spacing)
+    points, weights, *_ = samples_of(box, spacing)
     for axis in range(3):
         for sign in (-1, 1):
             face = np.isclose(points[:, axis], sign * box.half_extents[axis])
@@ -57,7 +57,7 @@ def test_every_face_of_a_box_has_weight_one(box, spacing):
 
 @pytest.mark.parametrize("spacing", [0.5, 0.25])
 def test_edges_and_corners_weigh_the_same_at_every_spacing(spacing):
-    points, weights, _ = samples_of(BOXES[0], spacing)
+    points, weights, *_ = samples_of(BOXES[0], spacing)
     faces = np.isclose(np.abs(points), 0.02).sum(axis=-1)
     assert weights[faces == 3] == pytest.approx(1 / 8)
     edge = np.isclose(points[:, 0], 0.02) & np.isclose(points[:, 1], 0.02)
@@ -70,7 +70,7 @@ def test_a_cube_has_8_20_and_44_samples():
 
 def test_a_capsule_has_its_samples_on_its_axis():
     for spacing in (1.0, 0.1, 0.05):
-        points, weights, radius = Capsule(0.1, 0.2).samples(spacing, 0.0)
+        points, weights, radius, _ = Capsule(0.1, 0.2).samples(spacing, 0.0)
         assert radius == 0.1
         np.testing.assert_array_equal(points[:, :2], 0.0)
         assert points[:, 2].min() == -0.2
@@ -82,14 +82,14 @@ def test_a_capsule_has_its_samples_on_its_axis():
 @pytest.mark.parametrize("spacing", SPACINGS)
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_particles_fill_a_box_out_to_its_faces(box, spacing):
-    points, weights, radius = box.particles(spacing * box.width)
+    points, weights, radius, _ = box.particles(spacing * box.width)
     np.testing.assert_allclose(points.max(axis=0) + radius, box.half_extents)
     np.testing.assert_allclose(points.min(axis=0) - radius, -np.array(box.half_extents))
     assert np.all(weights == weights[0])
 
 
 def test_a_face_of_particles_of_a_cube_has_weight_one():
-    points, weights, radius = BOXES[0].particles(0.01)
+    points, weights, radius, _ = BOXES[0].particles(0.01)
     assert weights[np.isclose(points[:, 2] + radius, 0.02)].sum() == pytest.approx(1.0)
 
 
