@@ -34,6 +34,10 @@ def run() -> None:
     )  # fmt: skip
     parser.add_argument("--threads", type=int, default=THREADS, help="of speed")
     parser.add_argument("--worlds", type=int, default=commits.WORLDS, help="of speed")
+    parser.add_argument(
+        "--policies", action="store_true",
+        help="speed in the states of the trained policies instead of with random actions",
+    )  # fmt: skip
     parser.add_argument("--turns", type=int, help="episodes per commit and task, of speed")
     parser.add_argument(
         "--trees", type=Path, metavar="FOLDER",
@@ -48,7 +52,12 @@ def run() -> None:
             tables = commits.states(trees, options.tasks, options.presets)
         else:
             tables = commits.speed(
-                trees, options.threads, options.tasks, options.turns, options.worlds
+                trees,
+                options.threads,
+                options.tasks,
+                options.turns,
+                options.worlds,
+                options.policies,
             )
         for table in tables:
             print(plain(table) + "\n", flush=True)

@@ -25,6 +25,7 @@ TURNS = {"push": 120, "stack": 60, "throw": 120}
 TASKS = tuple(TURNS)
 PRESETS = ("fast", "balanced", "accurate", "solid")
 WORLDS, EPISODES = 4096, 100
+POLICIES, POLICY = ROOT / "results" / "ppo", "RigidEnvs-{}-v0_seed0/policy.policy"
 PEERS = Path(__file__).resolve().parents[1] / "peers"
 
 Array = np.ndarray
@@ -72,6 +73,7 @@ def speed(
     tasks: Sequence[str] = TASKS,
     turns: int | None = None,
     worlds: int = WORLDS,
+    policies: bool = False,
 ) -> Iterator[Table]:
     """One table per task: rates of all trees, which take turns of one episode.
 
@@ -81,6 +83,7 @@ def speed(
         tasks: some of TASKS.
         turns: of each side; those of TURNS if None.
         worlds: of each side.
+        policies: in the states of this tree's trained policies; else with random actions.
     """
     reference = next(name for name in trees if name != HERE)
     for task in tasks:
@@ -89,6 +92,7 @@ def speed(
             sides = {}
             for name, tree in trees.items():
                 arguments = [task, str(worlds), str(threads)]
+                arguments += [str(POLICIES / POLICY.format(task.capitalize()))] if policies else []
                 command: Command = [sys.executable, PEERS / "episodes.py", *arguments]
                 sides[name] = children.enter_context(child(command, tree))
             rates = take_turns(sides, rounds, 0.0)  # a turn is one episode, whatever it takes
@@ -97,6 +101,7 @@ def speed(
             f"{task.capitalize()}, balanced, {worlds:,} worlds, {threads} threads, "
             f"{rounds} turns of one episode"
         )
+        title += " of the trained policy" if policies else ""
         yield Table(f"commits {task}", title, columns, ratios_to(reference, rates))
 
 

@@ -102,18 +102,23 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
     Vectors are in the frame of the half-pair's surface. With the impulse law they are in the world
     frame, and points are relative to the owner.
     """
-    worlds = slice(group * LANES, (group + 1) * LANES)
+    places = slice(group * LANES, (group + 1) * LANES)
+    lanes = np.flatnonzero(state.resident[places] >= 0)
+    worlds, resident = state.resident[places][lanes], np.full(LANES, -1)
+    resident[lanes] = np.arange(len(lanes))
     alone = slice(group, group + 1)
     copied = State(
-        dynamic=state.dynamic[worlds].copy(),
-        half_pair=state.half_pair[worlds].copy(),
-        touch=state.touch[..., worlds].copy(),
-        world=state.world[worlds].copy(),
+        dynamic=state.dynamic[worlds],  # a copy, as all of these
+        half_pair=state.half_pair[worlds],
+        touch=state.touch[..., worlds].copy(),  # worlds come last in memory
+        world=state.world[worlds],
         sample_id=state.sample_id[alone].copy(),
         candidate=state.candidate[alone].copy(),  # their memory must not change
-        wrench=state.wrench[worlds].copy(),
-        motor=state.motor[worlds].copy(),
-        pace=state.pace[worlds].copy(),
+        wrench=state.wrench[worlds] if state.wrench.size else state.wrench,
+        motor=state.motor[worlds],
+        pace=state.pace[worlds] if state.pace.size else state.pace,
+        place=lanes,
+        resident=resident,
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
     everyone = np.ones(len(copied.world), dtype=bool)
@@ -132,7 +137,7 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
     """Half-pair [n] and slot [n] of what touches in a world."""
     half_pair = np.repeat(np.arange(len(model.half_pair)), model.half_pair["slot_count"])
     place = np.arange(len(half_pair)) - model.half_pair["first_slot"][half_pair]
-    group, lane = divmod(world, LANES)
+    group, lane = divmod(state.place[world], LANES)
     touching = rows["penetration"][:, lane] > 0.0
     if "impact_force" in (state.candidate.dtype.names or ()):
         # an impact may come up to half a step before the solids touch
@@ -145,7 +150,8 @@ def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Arra
 
 def report(model: Model, features: Features, state: State, world: int) -> Report:
     """What touches in a world."""
-    rows, lane = _rows_of_group(model, features, state, world // LANES), world % LANES
+    group, lane = divmod(int(state.place[world]), LANES)
+    rows = _rows_of_group(model, features, state, group)
     model = model.of_world(world)
     half_pair, slot = _touching(model, state, world, rows)
 
@@ -172,9 +178,7 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
 
     force = in_world("force")
     if features.impulse:
-        force = force + rotated(
-            state.candidate["impact_force"][world // LANES, slot, :, lane], surface
-        )
+        force = force + rotated(state.candidate["impact_force"][group, slot, :, lane], surface)
     return Report(
         half_pair=half_pair,
         penetration=rows["penetration"][slot, lane],
@@ -265,7 +269,8 @@ def penetration(model: Model, features: Features, state: State) -> Array:
     half_pairs = model.of_world(0)
     for group in range(len(state.candidate)):
         rows = _rows_of_group(model, features, state, group)
-        for world in range(group * LANES, min((group + 1) * LANES, len(deepest))):
-            slot = _touching(half_pairs, state, world, rows)[1]
-            deepest[world] = rows["penetration"][slot, world % LANES].max(initial=0.0)
+        for lane, world in enumerate(state.resident[group * LANES : (group + 1) * LANES]):
+            if world >= 0:
+                slot = _touching(half_pairs, state, world, rows)[1]
+                deepest[world] = rows["penetration"][slot, lane].max(initial=0.0)
     return deepest

@@ -14,10 +14,13 @@ from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
 from physics.collision.surface_kinds import by_surface_kind
-from physics.compiler.jit import LANES, at, stage
+from physics.compiler.jit import at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.scene.shapes import GRID, PARTICLES, PLANE
+
+# relative to the skin: motion after which a list that isn't empty is replaced at the latest
+_LONGEST_TRAVEL = 4.0
 
 
 @cached_by_features
@@ -139,7 +142,7 @@ def make_list_samples(features):
                     ux, uy, uz = x - px, y - py, z - pz
                     separation = math.sqrt(ux * ux + uy * uy + uz * uz) - radius
                     if separation < reach and n == room:
-                        state.world[g * LANES + i].overflow = 1
+                        state.world[workspace.lane[0].world[i]].overflow = 1
                     elif separation < reach:
                         row, pair_id = candidate[n], s * half_pair.partner_count + j
                         smaller = min(weight, p[3])
@@ -180,7 +183,11 @@ def make_list_samples(features):
                 )
                 ids[n, i] = s
                 n += 1
-        return n, reach if n > 0 else nearest
+        if n > 0:
+            # A list that isn't empty keeps samples that have moved away, which cost as much as
+            # those that touch. Manifolds of the impulse law are chosen anew at each search
+            nearest = reach if impulse else min(nearest, _LONGEST_TRAVEL * reach)
+        return n, nearest
 
     return list_samples
 

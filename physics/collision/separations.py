@@ -19,14 +19,20 @@ def separation_bound(half_pair, i, relative):
     R, c, core = relative.rotation, relative.position, half_pair.core
     size = at(half_pair.owner_size, i)
     ex, ey, ez = size * half_pair.extent[0], size * half_pair.extent[1], size * half_pair.extent[2]
-    hx = abs(R[0, i]) * ex + abs(R[1, i]) * ey + abs(R[2, i]) * ez
-    hy = abs(R[3, i]) * ex + abs(R[4, i]) * ey + abs(R[5, i]) * ez
-    hz = abs(R[6, i]) * ex + abs(R[7, i]) * ey + abs(R[8, i]) * ez
+    gz = c[2, i] - at(core[0], i) if half_pair.kind == PLANE else abs(c[2, i]) - at(core[2], i)
+    # one product in each sum: with two, the compiler chooses which one it rounds
+    gz -= abs(R[6, i]) * ex
+    gz -= abs(R[7, i]) * ey
+    gz -= abs(R[8, i]) * ez
     if half_pair.kind == PLANE:
-        return c[2, i] - at(core[0], i) - hz - at(half_pair.radius, i)
-    gx = abs(c[0, i]) - at(core[0], i) - hx
-    gy = abs(c[1, i]) - at(core[1], i) - hy
-    gz = abs(c[2, i]) - at(core[2], i) - hz
+        return gz - at(half_pair.radius, i)
+    gx, gy = abs(c[0, i]) - at(core[0], i), abs(c[1, i]) - at(core[1], i)
+    gx -= abs(R[0, i]) * ex
+    gx -= abs(R[1, i]) * ey
+    gx -= abs(R[2, i]) * ez
+    gy -= abs(R[3, i]) * ex
+    gy -= abs(R[4, i]) * ey
+    gy -= abs(R[5, i]) * ez
     return max(gx, max(gy, gz)) - at(half_pair.radius, i)
 
 
@@ -65,9 +71,10 @@ def make_separations(features):
                 if turned:
                     tx, ty = turn(sx, sy, sz, R, c, i, ca, cb, cc)
                     sx, sy = tx if turns else sx, ty if turns else sy
-                x = xx * sx + xy * sy + xz * sz + x0
-                y = yx * sx + yy * sy + yz * sz + y0
-                z = zx * sx + zy * sy + zz * sz + z0
+                # one product in each sum, see `separation_bound`
+                x = xz * sz + (xy * sy + (xx * sx + x0))
+                y = yz * sz + (yy * sy + (yx * sx + y0))
+                z = zz * sz + (zy * sy + (zx * sx + z0))
                 separation[s] = distance(x, y, z, ca, cb, cc, radius, face_normals)[0] - radius
 
         return loop

@@ -36,7 +36,7 @@ HIGHEST_SERVO = 0.5
 
 
 @stage
-def _start(model, state, workspace, g, h):
+def _start(model, state, workspace, h):
     """Marks the rows that act and reads the motors' velocities; returns the number with bounds."""
     bounded = 0
     for r in range(model.joint_row.shape[0]):
@@ -50,9 +50,9 @@ def _start(model, state, workspace, g, h):
             work.rate[i] = 0.0
             work.active[i] = 1
             if row.role == MOTOR:
-                w = g * LANES + i
+                w = workspace.lane[0].world[i]
                 rate = 0.0
-                if w < state.motor.shape[0]:
+                if w >= 0:
                     rate = state.motor[w, row.motor, 0]
                     left = state.motor[w, row.motor, 1] - row.middle - work.value[i]
                     if row.kind == ANGLE and row.limits[1] == math.inf:  # the shorter way
@@ -135,14 +135,14 @@ def make_joint_forces(features):
     convective_rates = make_convective_rates(features)
 
     @stage
-    def joint_forces(model, state, workspace, g, h, drifted):
+    def joint_forces(model, state, workspace, h, drifted):
         """`h`: s, the step; `drifted`: s, what the last drift took, 0 in a refresh."""
         if joints:
             lane = workspace.lane[0]
             write_world_frame(workspace)
             linearise_rows(model, workspace)
             convective_rates(model, workspace, drifted)
-            bounded = _start(model, state, workspace, g, h)
+            bounded = _start(model, state, workspace, h)
             for i in range(LANES):
                 lane.joint_unconverged[i] = 1
             for _ in range(bounded + 1):  # each pass but the last bounds a row in every lane left

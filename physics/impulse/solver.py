@@ -207,7 +207,7 @@ def make_impulses(features):
         for i in range(LANES):
             normal_force[i] = 0.0
         store_forces(pair, candidate, workspace.lane[0].updates_memory, h, normal_force)
-        record_contacts(model, state, workspace, g, k, normal_force, elapsed)
+        record_contacts(model, state, workspace, k, normal_force, elapsed)
 
     @sequence
     def impulses(model, state, workspace, g, h, drifted, elapsed):

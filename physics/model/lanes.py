@@ -40,9 +40,9 @@ def make_constants(features: Features):
 
 
 @stage
-def load_forces(state, workspace, g, m, i):
+def load_forces(state, workspace, m, i):
     """Loads force and torque of dynamic body m into lane i."""
-    row, solid = state.dynamic[g * LANES + i, m], workspace.solid[m]
+    row, solid = state.dynamic[workspace.lane[0].world[i], m], workspace.solid[m]
     for c in range(3):
         solid.force[c, i] = row.force[c]
         solid.torque[c, i] = row.torque[c]
@@ -66,14 +66,15 @@ def load(model, state, workspace, chosen, g):
     """
     lane, count = workspace.lane[0], 0
     for i in range(LANES):
-        w = g * LANES + i
-        if w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0:
+        w = state.resident[g * LANES + i]
+        lane.world[i] = w
+        if w >= 0 and chosen[w] and state.world[w].diverged == 0:
             count += 1
     if count == 0:
         return 0
     for i in range(LANES):
-        w = g * LANES + i
-        active = w < chosen.shape[0] and chosen[w] and state.world[w].diverged == 0
+        w = lane.world[i]
+        active = w >= 0 and chosen[w] and state.world[w].diverged == 0
         lane.active[i] = 1 if active else 0
         lane.updates_memory[i] = 1 if active else 0
         lane.needs_refresh[i] = state.world[w].needs_refresh if active else 0
@@ -95,7 +96,7 @@ def load(model, state, workspace, chosen, g):
                 solid.reference_time[i] = row.reference_time  # for which the set point still moves
                 for c in range(4):
                     solid.orientation[c, i] = row.orientation[c]
-                load_forces(state, workspace, g, m, i)
+                load_forces(state, workspace, m, i)
             else:
                 for c in range(3):
                     solid.position[c, i] = 0.0
@@ -133,7 +134,7 @@ def load(model, state, workspace, chosen, g):
 
 
 @stage
-def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
+def record_contacts(model, state, workspace, k, normal_force, elapsed):
     """Records a half-pair's normal force [LANES] N, and its first contact."""
     half_pair, updates_memory = workspace.half_pair[k], workspace.lane[0].updates_memory
     first, previous = half_pair.first_touch, half_pair.previous_normal_force
@@ -145,11 +146,11 @@ def record_contacts(model, state, workspace, g, k, normal_force, elapsed):
         nothing_new = (normal_force[i] <= 0.0) | known | (updates_memory[i] == 0)
         new += 0 if nothing_new else 1
     if new > 0:
-        record_first_contact(model, state, workspace, g, k, normal_force, elapsed)
+        record_first_contact(model, state, workspace, k, normal_force, elapsed)
 
 
 @stage
-def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
+def record_first_contact(model, state, workspace, k, normal_force, elapsed):
     """Records the first contact of a half-pair, in the lanes that have it now.
 
     That is its time, and where the pair's first solid was: bodies come before drives and statics.
@@ -157,16 +158,17 @@ def record_first_contact(model, state, workspace, g, k, normal_force, elapsed):
     first, updates_memory = workspace.half_pair[k].first_touch, workspace.lane[0].updates_memory
     half_pair, start = model.half_pair[k], workspace.lane[0].start
     position = workspace.solid[min(half_pair.owner, half_pair.surface)].position
+    world = workspace.lane[0].world
     for i in range(LANES):
         time = start[i] + elapsed
         if normal_force[i] > 0.0 and not first[i] <= time and updates_memory[i] != 0:
             first[i] = time
             for c in range(3):
-                state.touch[k, FIRST_POSITION + c, g * LANES + i] = position[c, i]
+                state.touch[k, FIRST_POSITION + c, world[i]] = position[c, i]
 
 
 @stage
-def end_refresh(model, state, workspace, g):
+def end_refresh(model, state, workspace):
     """Ends a refresh, which computes forces in the whole group: other lanes get theirs back.
 
     `broadphase.make_forget` had limited `updates_memory` to the lanes whose contacts begin afresh;
@@ -177,13 +179,13 @@ def end_refresh(model, state, workspace, g):
         lane.updates_memory[i] = lane.active[i]
         if lane.active[i] and lane.needs_refresh[i] == 0:
             for m in range(model.dynamic.shape[0]):
-                load_forces(state, workspace, g, m, i)
+                load_forces(state, workspace, m, i)
 
 
 @stage
-def store(model, state, workspace, g, i, time):
+def store(model, state, workspace, i, time):
     """Stores lane i into its world, at `time` s; quaternions with w >= 0."""
-    w = g * LANES + i
+    w = workspace.lane[0].world[i]
     state.world[w].time = time
     for m in range(model.dynamic.shape[0]):
         solid, row = workspace.solid[m], state.dynamic[w, m]
@@ -199,8 +201,10 @@ def store(model, state, workspace, g, i, time):
         sign = -1.0 if solid.orientation[3, i] < 0.0 else 1.0
         for c in range(4):
             row.orientation[c] = sign * solid.orientation[c, i]
+    listed = 0
     for k in range(model.half_pair.shape[0]):
         half_pair, saved = workspace.half_pair[k], state.half_pair[w, k]
+        listed |= (1 if half_pair.count[i] > 0 else 0) << (k % 63)
         saved.count = half_pair.count[i]
         saved.remaining_skin = half_pair.remaining_skin[i]
         state.touch[k, FIRST_TOUCH, w] = half_pair.first_touch[i]
@@ -210,3 +214,4 @@ def store(model, state, workspace, g, i, time):
         saved.previous_weight = half_pair.previous_weight[i]
         saved.previous_impact = half_pair.previous_impact[i]
         saved.previous_closing = half_pair.previous_closing[i]
+    state.world[w].listed = listed

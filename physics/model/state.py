@@ -58,6 +58,7 @@ STATUS = np.dtype(
         ("needs_refresh", "i4"),
         ("diverged", "i4"),  # 0, or 1 + index of the first non-finite dynamic body
         ("overflow", "i8"),  # 1: a half-pair had more candidates than room
+        ("listed", "i8"),  # bits of the half-pairs that have candidates, see `step.lane_order`
     ],
     align=True,
 )
@@ -112,6 +113,8 @@ class State(NamedTuple):
         motor: [w, motors, 2] of each motor, in the order of the joints: rad/s or m/s; and rad or m,
             the set point of a servo, NaN: none.
         pace: [w] of PACE; [0] unless the integrator is adaptive.
+        place: [w] where each world is: lane group times LANES plus lane, see `step.lane_order`.
+        resident: [groups * LANES] the world at each place, -1 where there is none.
     """
 
     dynamic: Array
@@ -123,6 +126,8 @@ class State(NamedTuple):
     wrench: Array
     motor: Array
     pace: Array
+    place: Array
+    resident: Array
 
     @property
     def nbytes(self) -> int:
@@ -144,7 +149,10 @@ def allocate(model: Model, features: Features, count: int) -> State:
         wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
         motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1, 2)),
         pace=np.zeros(count if features.integrator == ADAPTIVE else 0, PACE),
+        place=np.arange(count),
+        resident=np.full(groups * LANES, -1),
     )
+    state.resident[:count] = state.place
     state.dynamic["orientation"][..., 3] = 1.0
     state.half_pair["remaining_skin"] = -1.0
     state.touch[...] = 0.0

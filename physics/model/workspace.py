@@ -120,6 +120,7 @@ TENSOR = np.dtype([("component", "f8", (6, LANES))], align=True)  # 1/(kg m^2): 
 # a single row
 LANE = np.dtype(
     [
+        ("world", "i8", (LANES,)),  # -1: none
         ("active", "i8", (LANES,)),  # 0: no world, one that has diverged, or one not advanced
         ("needs_refresh", "i8", (LANES,)),
         ("updates_memory", "i8", (LANES,)),  # 0: inactive, or a refresh of other lanes passes by

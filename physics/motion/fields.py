@@ -265,11 +265,11 @@ def make_wrenches(features):
     wrench = features.wrench
 
     @stage
-    def wrenches(state, workspace, g):
+    def wrenches(state, workspace):
         if wrench:
             for i in range(LANES):
-                w = g * LANES + i
-                if w < state.wrench.shape[0]:
+                w = workspace.lane[0].world[i]
+                if w >= 0:
                     for m in range(state.wrench.shape[1]):
                         solid = workspace.solid[m]
                         for c in range(3):

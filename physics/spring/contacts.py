@@ -222,7 +222,7 @@ def make_contacts(features):
             live = workspace.half_pair[k]
             if live.slots > 0:
                 # also makes the current normal force the previous one
-                record_contacts(model, state, workspace, g, k, live.current_normal_force, elapsed)
+                record_contacts(model, state, workspace, k, live.current_normal_force, elapsed)
                 weight, impact, closing = (
                     live.previous_weight,
                     live.previous_impact,

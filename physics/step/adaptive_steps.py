@@ -46,7 +46,7 @@ def load_pace(state, workspace, g):
         pace.rejected[i] = 0
         pace.vanished[i] = 0
         if lane.active[i]:
-            pace.proposal[i] = state.pace[g * LANES + i].step
+            pace.proposal[i] = state.pace[lane.world[i]].step
 
 
 @cached_by_features
@@ -121,9 +121,9 @@ def make_write_back(features: Features):
         lane, pace = workspace.lane[0], workspace.pace[0]
         for i in range(LANES):
             if lane.active[i]:
-                w = g * LANES + i
-                store(model, state, workspace, g, i, lane.start[i] + pace.done[i])
-                write_rows(model, state, w, table)
+                w = lane.world[i]
+                store(model, state, workspace, i, lane.start[i] + pace.done[i])
+                write_rows(model, state, w, i, table)
                 saved = state.pace[w]
                 saved.step = pace.proposal[i]
                 saved.accepted += pace.accepted[i]
@@ -178,8 +178,9 @@ def make_kernel(features: Features):
                 refresh = False
             write_back(model, state, workspace, table, g)
         failed = 0
-        for w in range(first * LANES, min(last * LANES, chosen.shape[0])):
-            if chosen[w] and state.world[w].diverged != 0:
+        for place in range(first * LANES, last * LANES):
+            w = state.resident[place]
+            if w >= 0 and chosen[w] and state.world[w].diverged != 0:
                 failed += 1
         return failed
 

@@ -210,7 +210,7 @@ def record_impacts(model, state, workspace, g, h, elapsed):
             if impulse > 0.0 and not live.first_touch[i] <= time:
                 live.first_touch[i] = time
                 for c in range(3):
-                    state.touch[k, FIRST_POSITION + c, g * LANES + i] = first[c, i]
+                    state.touch[k, FIRST_POSITION + c, lane.world[i]] = first[c, i]
 
 
 @cached_by_features

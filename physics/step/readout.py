@@ -66,9 +66,8 @@ def make_write_rows(features: Features):
     rotation = features.rotation
 
     @stage
-    def write_rows(model, state, w, table):
-        """`model`: of the world's group."""
-        lane = w % LANES
+    def write_rows(model, state, w, lane, table):
+        """`model`: of the world's group; `lane`: that of the world."""
         for i in range(table.shape[0]):
             m, constants = state.dynamic[w, i], model.dynamic[i]
             table[i, 0, w] = m.position[0]
@@ -114,6 +113,7 @@ def make_readout(features: Features) -> Any:
     def readout(model, state, table):
         _ = sources
         for w in range(state.dynamic.shape[0]):
-            write_rows(constants(model, w // LANES), state, w, table)
+            g, lane = state.place[w] // LANES, state.place[w] % LANES
+            write_rows(constants(model, g), state, w, lane, table)
 
     return readout

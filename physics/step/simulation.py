@@ -28,6 +28,7 @@ from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.solids import Body
 from physics.step.adaptive_steps import make_adaptive_advance
+from physics.step.lane_order import PAUSE, can_sort, sort_worlds
 from physics.step.readout import WIDTH, Readout, make_readout
 from physics.step.threads import run_in_blocks
 from physics.step.time_layers import make_advance, substep_count
@@ -70,6 +71,7 @@ class Simulation:
         self.everyone = np.ones(count, dtype=bool)
         self._find_kernels()
         self._idle: list[Workspace] = []
+        self._calls_to_sort = 1
         self._fresh = False
         self._table = columns((len(self.base.dynamic), WIDTH), count, float)
         self._table_valid = self._lent = False
@@ -212,6 +214,11 @@ class Simulation:
         model, state, table = self.model, self.state, self._table
         collision_substeps = self.fidelity.collision_substeps
         groups, idle = -(-self.count // LANES), self._idle
+        if substeps > 0 and can_sort(self.features, self.count):
+            self._calls_to_sort -= 1
+            if self._calls_to_sort <= 0:
+                moved = sort_worlds(model, state, self.threads)
+                self._calls_to_sort = 1 if moved else PAUSE
 
         def run(first: int, last: int) -> Any:
             try:

@@ -36,13 +36,13 @@ def make_forces(features: Features):
         present_velocities(model, workspace, lag * drifted)
         gravity(model, workspace)
         fields(model, workspace)
-        wrenches(state, workspace, g)
+        wrenches(state, workspace)
         drives(model, workspace, drifted)
         if impulse:  # its sweeps correct the joints' forces
-            joint_forces(model, state, workspace, g, h, drifted)
+            joint_forces(model, state, workspace, h, drifted)
         contacts(model, state, workspace, g, span, drifted, elapsed)
         if not impulse:
-            joint_forces(model, state, workspace, g, h, drifted)
+            joint_forces(model, state, workspace, h, drifted)
         couple_fingers(model, workspace, drifted)
 
     return forces
@@ -77,7 +77,7 @@ def make_substep(features: Features):
         span, drifted = (refresh_span * h, 0.0) if refresh else (h, h)
         forces(model, state, workspace, g, h, span, drifted, elapsed)
         if refresh:
-            end_refresh(model, state, workspace, g)
+            end_refresh(model, state, workspace)
         elif not euler:
             kick(model, workspace, 0.5 * h)
 

@@ -56,9 +56,9 @@ def make_write_back(features: Features):
             if lane.active[i]:
                 diverged = first_diverged(model, workspace, i)
                 if last or diverged != 0:
-                    w = g * LANES + i
-                    store(model, state, workspace, g, i, lane.start[i] + elapsed)
-                    write_rows(model, state, w, table)
+                    w = lane.world[i]
+                    store(model, state, workspace, i, lane.start[i] + elapsed)
+                    write_rows(model, state, w, i, table)
                     state.world[w].needs_refresh = end_call(model, workspace, i)
                     state.world[w].diverged = diverged
                     lane.active[i] = 0
@@ -97,7 +97,7 @@ def make_advance(features: Features):
                 needs_refresh += lane.needs_refresh[i]
             for i in range(LANES):
                 if lane.active[i]:
-                    state.world[g * LANES + i].overflow = 0
+                    state.world[lane.world[i]].overflow = 0
             # States that were set from outside have no forces yet, so their first step begins with
             # a refresh. It shares the call of `substep`, which would otherwise be compiled twice
             refresh = needs_refresh > 0
@@ -115,10 +115,11 @@ def make_advance(features: Features):
                 if done == substeps:
                     break
         failed = 0
-        for w in range(first * LANES, min(last * LANES, chosen.shape[0])):
-            status = state.world[w]
-            if chosen[w] and (status.diverged != 0 or status.overflow != 0):
-                failed += 1
+        for place in range(first * LANES, last * LANES):
+            w = state.resident[place]
+            if w >= 0 and chosen[w]:
+                status = state.world[w]
+                failed += 1 if status.diverged != 0 or status.overflow != 0 else 0
         return failed
 
     return advance

@@ -22,6 +22,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.policies.policy import Policy
@@ -44,6 +45,9 @@ SQUASHING_FUNCTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "softsign": lambda x: x / (1.0 + np.abs(x)),
 }
 
+# NumPy's linear algebra library
+_BLAS = ThreadpoolController()
+
 
 @dataclass(frozen=True)
 class PolicyFile:
@@ -61,7 +65,8 @@ class PolicyFile:
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """The mean action, equal to Stable-Baselines3's `predict(deterministic=True)`.
 
-        Sums are in float64, so that a world's action hardly depends on the number of worlds.
+        Sums are in float64, so that a world's action hardly depends on the number of worlds. They
+        run on one thread: the threads of BLAS would spin on the cores that the worlds need.
 
         Args:
             observation: `{key: (n, ...)}`, with the keys of the header.
@@ -95,8 +100,9 @@ class PolicyFile:
             parts.append(value.astype(np.float32).reshape(len(value), -1))
         x = np.concatenate(parts, axis=1).astype(np.float64)
         activation = ACTIVATIONS[header.network.activation]
-        for number, (weights, biases) in enumerate(self.layers):
-            x = (activation(x) if number else x) @ weights.T.astype(np.float64) + biases
+        with _BLAS.limit(limits=1, user_api="blas"):
+            for number, (weights, biases) in enumerate(self.layers):
+                x = (activation(x) if number else x) @ weights.T.astype(np.float64) + biases
         low, high = np.array(header.network.low), np.array(header.network.high)
         if header.network.squashing in SQUASHING_FUNCTIONS:
             x = low + 0.5 * (SQUASHING_FUNCTIONS[header.network.squashing](x) + 1.0) * (high - low)

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_info
 
 from tests.training.reach import ReachVectorEnv
 from training.commands import cli
-from training.policies.policy_file import load_policy_file, read_policy
+from training.policies.policy_file import ACTIVATIONS, load_policy_file, read_policy
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.results.results import SOURCE
@@ -340,3 +341,19 @@ def test_export_copies_the_policy_of_a_run(quick_ppo, tmp_path, capsys):
     assert cli.main(["export", str(folder.path), "-o", str(tmp_path / "x.zip")]) == 2
     assert "should end in .policy" in capsys.readouterr().err
     assert cli.main(["export", str(tmp_path)]) == 2
+
+
+def test_a_policy_acts_on_one_thread_of_blas(saved, monkeypatch):
+    """The other threads would wait in a loop on the cores that the worlds need."""
+    used = []
+
+    def activation(x):
+        used.extend(p["num_threads"] for p in threadpool_info() if p["user_api"] == "blas")
+        return np.tanh(x)
+
+    monkeypatch.setitem(ACTIVATIONS, "tanh", activation)
+    policy = load_policy_file(saved)
+    assert policy.header.network.activation == "tanh"
+    policy.act(observations())
+    assert used
+    assert set(used) == {1}
