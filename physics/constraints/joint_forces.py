@@ -54,10 +54,11 @@ def _start(model, state, workspace, h):
                 rate = 0.0
                 if w >= 0:
                     rate = state.motor[w, row.motor, 0]
-                    left = state.motor[w, row.motor, 1] - row.middle - work.value[i]
+                    aim = state.motor[w, row.motor, 1] - row.middle
+                    left = min(max(aim, row.limits[0]), row.limits[1]) - work.value[i]
                     if row.kind == ANGLE and row.limits[1] == math.inf:  # the shorter way
                         left -= 2.0 * math.pi * math.floor(left / (2.0 * math.pi) + 0.5)
-                    rate = frequency * left if left == left else rate  # NaN: no servo
+                    rate = frequency * left if aim == aim else rate  # NaN: no servo
                 rate = max(rate, 0.0) if work.value[i] <= row.limits[0] + margin else rate
                 rate = min(rate, 0.0) if work.value[i] >= row.limits[1] - margin else rate
                 work.rate[i] = rate

@@ -280,7 +280,7 @@ def make_event_substep(features, make_forces):
             for i in range(LANES):
                 if workspace.lane[0].needs_refresh[i] == 0:  # the refresh passed it by
                     clear_given(model, workspace, i)
-            end_refresh(model, state, workspace, g)
+            end_refresh(model, state, workspace)
         else:
             count_impulses(model, workspace, h)
             kick(model, workspace, 0.5 * h)

@@ -30,7 +30,7 @@ def make_trials(features: Features):
             if not refresh and s < stages:
                 save_rates(model, workspace, s)
         if refresh:
-            end_refresh(model, state, workspace, g)
+            end_refresh(model, state, workspace)
 
     return trials
 

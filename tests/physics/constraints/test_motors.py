@@ -163,6 +163,13 @@ def test_a_servo_between_limits_takes_the_way_that_is_free():
     assert float(world.joint_position()[0, 0]) == pytest.approx(2.6, abs=1e-3)
 
 
+def test_a_servo_with_a_set_point_beyond_a_limit_rests_at_the_limit():
+    world = pendulum(0.0, "balanced", limits=(-1.0, 1.0), motor=Motor(20.0, position=2.0))
+    world.advance(3.0)
+    assert float(world.joint_position()[0, 0]) == pytest.approx(1.0, abs=1e-3)
+    assert abs(float(world.joint_velocity()[0, 0])) < 1e-3
+
+
 @pytest.mark.parametrize("frequency", [300.0, 1e6])
 def test_a_servo_faster_than_the_substep_does_not_overshoot(frequency):
     motor = Motor(5000.0, position=1.0, frequency=frequency)
