@@ -185,7 +185,7 @@ def make_list_samples(features):
                 n += 1
         if n > 0:
             # A list that isn't empty keeps samples that have moved away, which cost as much as
-            # those that touch. Manifolds of the impulse law are chosen anew at each search
+            # those that touch. The impulse law chooses its manifold at each search
             nearest = reach if impulse else min(nearest, _LONGEST_TRAVEL * reach)
         return n, nearest
 

@@ -77,7 +77,7 @@ def _take_impulses_back(model, workspace):
 
 @stage
 def _judge(lane):
-    """Ends lanes whose violation hasn't at least halved; returns the number that goes on."""
+    """Ends lanes whose violation hasn't at least halved; returns how many are left."""
     left = 0
     for i in range(LANES):
         halved = lane.joint_residual[i] <= 0.5 * lane.joint_before[i]
