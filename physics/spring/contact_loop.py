@@ -15,7 +15,11 @@ from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, CYLINDER, PLANE
 from physics.spring.coulomb import friction_force, is_set_down, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
-from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
+from physics.spring.hunt_crossley import (
+    calm_speed_per_load,
+    dashpot_force,
+    hunt_crossley_force,
+)
 
 # one row per slot: what `World.contacts` reports of the candidates there
 REPORT = np.dtype(
@@ -60,6 +64,7 @@ def make_contact_loop(features, kind, report):
         mean_impact_speeds, impact_ratios = relative.mean_impact_speed, relative.impact_ratio
         impact_sum, closing_sum = relative.impact_sum, relative.closing_sum
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
+        calm_speeds, damped_speeds = relative.calm_per_load, relative.damped_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight, updates = relative.current_weight, relative.updates_candidates
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
@@ -79,7 +84,8 @@ def make_contact_loop(features, kind, report):
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
                 share = at(overlap_share, i)
-                inverse_mass, speed_per_load = inverse_masses[i], speeds_per_load[i]
+                inverse_mass = inverse_masses[i]
+                calm_per_load, damped_per_load = calm_speeds[i], damped_speeds[i]
                 rx, ry, rz, nx, ny, nz, penetration, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals, axial
                 )
@@ -100,7 +106,9 @@ def make_contact_loop(features, kind, report):
                     inverse_mass += rotational
                     lighter = 1.0 + mass * rotational
                     load_rate *= 1.0 / lighter
-                    speed_per_load *= math.sqrt(lighter)
+                    speed_per_load = speeds_per_load[i] * math.sqrt(lighter)
+                    calm_per_load = calm_speed_per_load(a, speed_per_load)
+                    damped_per_load = a * speed_per_load
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -117,7 +125,8 @@ def make_contact_loop(features, kind, report):
                     a,
                     floor,
                     inverse_mass,
-                    speed_per_load,
+                    calm_per_load,
+                    damped_per_load,
                     h,
                     load_rate,
                     inverse_mean_forces[i],
@@ -126,13 +135,12 @@ def make_contact_loop(features, kind, report):
                     impact_speed,
                     memory[FORCE, i],
                     memory[APPROACH, i],
+                    weight > 0.0,
                 )
-                # an empty slot stays empty, whatever the lane's state
-                normal = normal if weight > 0.0 else 0.0
-                impact_speed = impact_speed if weight > 0.0 else 0.0
                 updates_memory = updates[i] != 0.0
                 memory[SPEED, i] = impact_speed if updates_memory else memory[SPEED, i]
                 memory[FORCE, i] = normal if updates_memory else memory[FORCE, i]
+                # an empty slot stays empty, whatever the lane's state
                 kept = approach if weight > 0.0 else 0.0
                 memory[APPROACH, i] = kept if updates_memory else memory[APPROACH, i]
                 current_weight[i] += weight if normal > 0.0 else 0.0
@@ -178,8 +186,7 @@ def make_contact_loop(features, kind, report):
                             persistence,
                             wound,
                         )
-                        fx += gx
-                        fy += gy
+                        fx, fy = gx, gy
                     else:
                         along = sx * nx + sy * ny + sz * nz
                         gx, gy, gz, sx, sy, sz = friction_force(

@@ -63,6 +63,12 @@ _CALM = 2.0
 
 
 @stage
+def calm_speed_per_load(a, speed_per_load):
+    """Impact speed, per N of load, up to which a contact lasts; `speed_per_load` is 1/(m omega)."""
+    return max(a, _CALM) * speed_per_load
+
+
+@stage
 def hunt_crossley_force(
     penetration,
     approach,
@@ -70,7 +76,8 @@ def hunt_crossley_force(
     a,
     floor,
     inverse_mass,
-    speed_per_load,
+    calm_per_load,
+    damped_per_load,
     h,
     load_rate,
     inverse_mean_force,
@@ -79,6 +86,7 @@ def hunt_crossley_force(
     impact_speed,
     previous_force,
     previous_approach,
+    exists,
 ):
     """Normal force of a sample that carries the whole pair's stiffness.
 
@@ -90,7 +98,8 @@ def hunt_crossley_force(
         floor: m/s, lower bound of the impact speed.
         inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
             of the effective mass at its contact point, to which rotation contributes.
-        speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
+        calm_per_load: m/s per N, see `calm_speed_per_load`.
+        damped_per_load: m/s per N, a/(m omega) of the mass of `inverse_mass`.
         h: s.
         load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
@@ -99,6 +108,7 @@ def hunt_crossley_force(
         impact_speed: m/s, remembered; negative while separating, 0 while apart.
         previous_force: N, f of the last step.
         previous_approach: m/s, of the last step.
+        exists: whether the slot holds a sample; an empty one gives zeros.
 
     Returns:
         Force in N, impact speed to remember in m/s, and persistence: 1 for a contact that lasts,
@@ -115,16 +125,15 @@ def hunt_crossley_force(
     joined = previous_approach * impact_ratio if previous_approach != 0.0 else mean_impact_speed
     # only a sample that comes through the surface joins: not one that was inside and changed face
     joined = min(joined, mean_impact_speed) if penetration <= h * approach else 0.0
-    remembered = joined if begins else abs(impact_speed)
-    turned_around = (impact_speed < 0.0) & (approach > 0.0)
-    speed = max(max(0.0 if turned_around else remembered, approach), floor)
-    calm_per_load = max(a, _CALM) * speed_per_load
+    # after turning around it is negative while the sample approaches, and `approach` is larger
+    remembered = impact_speed if approach > 0.0 else abs(impact_speed)
+    speed = max(max(joined if begins else remembered, approach), floor)
     change = load_rate * (approach - previous_approach)
     by_force = previous_force + change * (previous_force * inverse_mean_force)
     lasts = speed <= max(floor, calm_per_load * by_force)
     load = previous_force + change if lasts else by_force
-    load = 0.0 if begins else min(max(load, 0.0), k * max(penetration, 0.0))
-    v = max(speed, a * speed_per_load * load)
+    load = 0.0 if begins else max(min(load, k * penetration), 0.0)
+    v = max(speed, damped_per_load * load)
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
@@ -135,6 +144,7 @@ def hunt_crossley_force(
     force = numerator * v * inverse
     # a sample that is apart, in reach only through b, and separates already, never touched
     touching = (reach > 0.0) & ((impact_speed != 0.0) | (approach > 0.0) | (penetration > 0.0))
+    touching &= exists
     force = force if touching & (force > 0.0) else 0.0
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
@@ -150,7 +160,8 @@ def dashpot_force(
     zeta,
     floor,
     inverse_mass,
-    speed_per_load,
+    calm_per_load,
+    damped_per_load,
     h,
     load_rate,
     inverse_mean_force,
@@ -159,6 +170,7 @@ def dashpot_force(
     impact_speed,
     previous_force,
     previous_approach,
+    exists,
 ):
     """As `hunt_crossley_force`, by the clamped linear dashpot.
 
@@ -169,5 +181,5 @@ def dashpot_force(
     x = rate * h
     damped = rate / inverse_mass * approach * (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
     force = k * penetration + damped
-    force = force if (penetration > 0.0) & (force > 0.0) else 0.0
+    force = force if (penetration > 0.0) & (force > 0.0) & exists else 0.0
     return force, 0.0, 1.0

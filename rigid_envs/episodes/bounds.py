@@ -1,4 +1,4 @@
-"""Clips observations to their bounds, in one pass over all worlds."""
+"""Clips observations to their bounds and transposes them, in one pass over all worlds each."""
 
 from functools import cache
 from typing import Any
@@ -9,6 +9,8 @@ from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
 
 Array = np.ndarray
+
+_BLOCK = 64  # worlds; about 10 KB of rows
 
 
 @cache
@@ -50,3 +52,35 @@ def clip(columns: Array, low: Array, high: Array, count: int) -> Array:
     outside = np.empty(count, dtype=bool)
     _make_clip()(columns, low, high, outside)
     return outside
+
+
+@cache
+def _make_transpose() -> Any:
+    sources = SOURCES
+
+    @entry
+    def transpose(columns, first, rows):
+        _ = sources
+        # a block's rows stay in the cache until its last column is written
+        for start in range(0, rows.shape[0], _BLOCK):
+            end = min(start + _BLOCK, rows.shape[0])
+            for c in range(rows.shape[1]):
+                column = columns[first + c]
+                for i in range(start, end):
+                    rows[i, c] = column[i]
+
+    return transpose
+
+
+def rows_of(columns: Array, first: int, last: int, count: int) -> Array:
+    """Columns `first` to `last` - 1 as rows [count, n], one per world.
+
+    Args:
+        columns: [n, count or more] float32, C-contiguous.
+        first: index of the first column.
+        last: index behind that of the last.
+        count: number of worlds.
+    """
+    rows = np.empty((count, last - first), dtype=np.float32)
+    _make_transpose()(columns, first, rows)
+    return rows

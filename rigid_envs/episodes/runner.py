@@ -11,7 +11,7 @@ from physics import Fidelity, Parameters, Snapshot, World
 from physics.compiler.jit import columns
 from physics.scene.validation import choice, instance
 from rigid_envs.episodes.arguments import argument_names, make_task
-from rigid_envs.episodes.bounds import clip
+from rigid_envs.episodes.bounds import clip, rows_of
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.draws import uniform
 from rigid_envs.episodes.randomization import Randomization
@@ -230,8 +230,8 @@ class Runner:
         self._goal_distance = distance(achieved, desired)
         # one row per world, as users expect
         observation = {
-            "observation": values[:, :goal_start].copy(),
-            "achieved_goal": achieved.copy(),
+            "observation": rows_of(table, 0, goal_start, self.count),
+            "achieved_goal": rows_of(table, goal_start, len(table), self.count),
             "desired_goal": desired.copy(),
         }
         success: Array = self.reward.success(self._goal_distance)
