@@ -71,26 +71,29 @@ def make_search_half_pair(features):
 
 
 @stage
-def bound_motion_over_plane(solid, relative_motion):
-    """Upper bound in m of a solid's motion along the normal of a plane, which is the world's z."""
-    displacement, rotation_bound = solid.displacement, solid.rotation_bound
-    for i in range(LANES):
-        relative_motion[i] = abs(displacement[2, i]) + rotation_bound[i]
+def spend_skin(solid, other, half_pair, live, least):
+    """Reduces the remaining skin by the relative motion of the last drift.
 
-
-@stage
-def bound_motion_between(solid, other, relative_motion):
-    """Upper bound in m of the motion of two solids relative to each other.
-
-    The sum of absolute values is an upper bound of the length, and needs no root.
+    The bound of that motion in m is the sum of absolute values along the axes, which needs no root,
+    and of what rotation adds; over a plane the world's z axis alone counts. Returns the number of
+    lanes with less skin left than the motion, or than `least` times the skin.
     """
     displacement, rotation_bound = solid.displacement, solid.rotation_bound
     other_displacement, other_bound = other.displacement, other.rotation_bound
+    relative_motion, remaining_skin = live.relative_motion, live.remaining_skin
+    skin, exhausted = half_pair.skin, 0
+    across = 0.0 if half_pair.kind == PLANE else 1.0
+    # a single loop for both: LLVM unrolls shorter ones instead of vectorising them
     for i in range(LANES):
         dx = displacement[0, i] - other_displacement[0, i]
         dy = displacement[1, i] - other_displacement[1, i]
         dz = displacement[2, i] - other_displacement[2, i]
-        relative_motion[i] = abs(dx) + abs(dy) + abs(dz) + rotation_bound[i] + other_bound[i]
+        motion = across * (abs(dx) + abs(dy)) + abs(dz) + rotation_bound[i] + other_bound[i]
+        left = remaining_skin[i] - motion
+        relative_motion[i] = motion
+        remaining_skin[i] = left
+        exhausted += 1 if left < max(motion, least * at(skin, i)) else 0
+    return exhausted
 
 
 @cached_by_features
@@ -106,18 +109,9 @@ def make_broadphase(features):
     def broadphase(model, state, workspace, g, starts_collision_step):
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
-            least, skin = _RENEWAL if starts_collision_step else 0.0, half_pair.skin
+            least = _RENEWAL if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
-            if half_pair.kind == PLANE:
-                bound_motion_over_plane(owner, live.relative_motion)
-            else:
-                bound_motion_between(owner, surface, live.relative_motion)
-            remaining_skin, relative_motion = live.remaining_skin, live.relative_motion
-            exhausted = 0
-            for i in range(LANES):
-                left = remaining_skin[i] - relative_motion[i]
-                remaining_skin[i] = left
-                exhausted += 1 if left < max(relative_motion[i], least * at(skin, i)) else 0
+            exhausted = spend_skin(owner, surface, half_pair, live, least)
             if exhausted > 0:
                 search_half_pair(model, state, workspace, g, k, least)
 
@@ -140,8 +134,7 @@ def make_forget(features):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
             for i in range(LANES):
                 if lane.needs_refresh[i] == STARTS_ANEW:
-                    # the state before may have diverged and left anything in a slot
-                    for n in range(half_pair.slot_count):
+                    for n in range(live.count[i]):  # behind them slots are empty
                         clear(state.candidate[g, half_pair.first_slot + n], i)
                     live.count[i] = 0
                     live.remaining_skin[i] = -1.0  # below zero: the broadphase searches it

@@ -34,7 +34,7 @@ from physics.impulse.restitution import make_find_all_impacts, make_impacts
 from physics.impulse.sweep import make_sweep
 from physics.model.contact_memory import contact_memory
 from physics.model.features import EULER, cached_by_features
-from physics.model.lanes import record_contacts
+from physics.model.lanes import all_update, record_first_contact, update_previous
 from physics.motion.drives import make_finger_velocity_coupling
 from physics.motion.vectors import rotated_back, tensor_times
 
@@ -207,7 +207,12 @@ def make_impulses(features):
         for i in range(LANES):
             normal_force[i] = 0.0
         store_forces(pair, candidate, workspace.lane[0].updates_memory, h, normal_force)
-        record_contacts(model, state, workspace, k, normal_force, elapsed)
+        record_first_contact(model, state, workspace, k, normal_force, elapsed)
+        previous, updates_memory = (
+            workspace.half_pair[k].previous_normal_force,
+            workspace.lane[0].updates_memory,
+        )
+        update_previous(previous, normal_force, updates_memory, all_update(updates_memory))
 
     @sequence
     def impulses(model, state, workspace, g, h, drifted, elapsed):

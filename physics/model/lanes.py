@@ -7,7 +7,7 @@ what is rare goes lane by lane. Lanes never mix: a world's result does not depen
 the other lanes.
 """
 
-from physics.compiler.jit import LANES, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.model.features import Features, cached_by_features
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE
 from physics.model.tables import Model
@@ -56,6 +56,16 @@ def count_slots(workspace, k):
     for i in range(LANES):
         slots = max(slots, half_pair.count[i])
     half_pair.slots = slots
+
+
+@stage
+def count_untouched(workspace, k):
+    """Updates the number of lanes in which half-pair k had no contact before this call."""
+    half_pair, start = workspace.half_pair[k], workspace.lane[0].start
+    untouched = 0
+    for i in range(LANES):
+        untouched += 0 if half_pair.first_touch[i] <= start[i] else 1
+    half_pair.untouched = untouched
 
 
 @stage
@@ -128,25 +138,39 @@ def load(model, state, workspace, chosen, g):
                 half_pair.previous_weight[i] = 0.0
                 half_pair.previous_impact[i] = 0.0
                 half_pair.previous_closing[i] = 0.0
+    for m in range(model.dynamic.shape[0]):
+        weight = workspace.solid[m].weight
+        for c in range(3):
+            w = model.dynamic[m].weight[c]
+            for i in range(LANES):
+                weight[c, i] = at(w, i)
     for k in range(model.half_pair.shape[0]):
         count_slots(workspace, k)
+        count_untouched(workspace, k)
     return count
 
 
 @stage
-def record_contacts(model, state, workspace, k, normal_force, elapsed):
-    """Records a half-pair's normal force [LANES] N, and its first contact."""
-    half_pair, updates_memory = workspace.half_pair[k], workspace.lane[0].updates_memory
-    first, previous = half_pair.first_touch, half_pair.previous_normal_force
-    start, new = workspace.lane[0].start, 0
+def all_update(updates_memory):
+    """Whether every lane updates its memory, as in nearly all steps of a full group."""
+    updating = 0
     for i in range(LANES):
-        previous[i] = normal_force[i] if updates_memory[i] != 0 else previous[i]
-        # `first` is NaN before the first contact, so the comparison is false
-        known = first[i] <= start[i] + elapsed
-        nothing_new = (normal_force[i] <= 0.0) | known | (updates_memory[i] == 0)
-        new += 0 if nothing_new else 1
-    if new > 0:
-        record_first_contact(model, state, workspace, k, normal_force, elapsed)
+        updating += 1 if updates_memory[i] != 0 else 0
+    return updating == LANES
+
+
+@stage
+def update_previous(previous, current, updates_memory, everyone):
+    """Copies values [LANES] of this step to those of the last, in lanes that update their memory.
+
+    `everyone`: `all_update`, for LLVM makes vector instructions of a copy without a condition only.
+    """
+    if everyone:
+        for i in range(LANES):
+            previous[i] = current[i]
+    else:
+        for i in range(LANES):
+            previous[i] = current[i] if updates_memory[i] != 0 else previous[i]
 
 
 @stage
@@ -154,17 +178,22 @@ def record_first_contact(model, state, workspace, k, normal_force, elapsed):
     """Records the first contact of a half-pair, in the lanes that have it now.
 
     That is its time, and where the pair's first solid was: bodies come before drives and statics.
+    `normal_force`: [LANES] N.
     """
-    first, updates_memory = workspace.half_pair[k].first_touch, workspace.lane[0].updates_memory
-    half_pair, start = model.half_pair[k], workspace.lane[0].start
+    live, updates_memory = workspace.half_pair[k], workspace.lane[0].updates_memory
+    if live.untouched == 0:
+        return
+    first, half_pair, start = live.first_touch, model.half_pair[k], workspace.lane[0].start
     position = workspace.solid[min(half_pair.owner, half_pair.surface)].position
     world = workspace.lane[0].world
     for i in range(LANES):
         time = start[i] + elapsed
+        # `first` is NaN before the first contact, so the comparison is false
         if normal_force[i] > 0.0 and not first[i] <= time and updates_memory[i] != 0:
             first[i] = time
             for c in range(3):
                 state.touch[k, FIRST_POSITION + c, world[i]] = position[c, i]
+    count_untouched(workspace, k)
 
 
 @stage

@@ -27,6 +27,7 @@ SOLID = np.dtype(
         ("reference", "f8", (3, LANES)),  # m
         ("reference_velocity", "f8", (3, LANES)),  # m/s
         ("reference_time", "f8", (LANES,)),  # s
+        ("weight", "f8", (3, LANES)),  # N, see `DYNAMIC.weight`
         ("rotation", "f8", (9, LANES)),  # matrix, row by row: body frame to world frame
         ("velocity", "f8", (3, LANES)),  # m/s
         ("angular_velocity", "f8", (3, LANES)),  # rad/s
@@ -73,6 +74,7 @@ HALF_PAIR_WORK = np.dtype(
         ("current_closing", "f8", (LANES,)),
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
+        ("untouched", "i8"),  # lanes without contact before this call
     ],
     align=True,
 )

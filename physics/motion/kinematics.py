@@ -48,8 +48,6 @@ def write_drive_frames(model, workspace):
         if not model.dynamic[m].is_body:
             solid = workspace.solid[m]
             for i in range(LANES):
-                for c in range(3):
-                    solid.angular_velocity[c, i] = 0.0
                 write_rotation(solid, i)
 
 
@@ -100,18 +98,18 @@ def make_kinematics(features):
             q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
             v, omega = solid.velocity, solid.angular_velocity
             inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
+            # drives have an inverse inertia of zero. Without omega the loop would be so short that
+            # LLVM unrolls it instead of vectorising it
             for i in range(LANES):
                 v[0, i] = at(inverse_mass, i) * P[0, i]
                 v[1, i] = at(inverse_mass, i) * P[1, i]
                 v[2, i] = at(inverse_mass, i) * P[2, i]
-            if not constants.is_body:  # see write_drive_frames
-                continue
-            for i in range(LANES):
-                write_rotation(solid, i)
-            for i in range(LANES):
                 ox, oy, oz = angular_velocity(q, j, i, L[0, i], L[1, i], L[2, i])
                 omega[0, i] = ox
                 omega[1, i] = oy
                 omega[2, i] = oz
+            if constants.is_body:  # the others: `write_drive_frames`
+                for i in range(LANES):
+                    write_rotation(solid, i)
 
     return kinematics

@@ -12,7 +12,7 @@ from physics.collision.relative_frame import relative_gravity, relative_pose, re
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
-from physics.model.lanes import record_contacts
+from physics.model.lanes import all_update, record_first_contact, update_previous
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
 from physics.spring.contact_loop import make_contact_loop
@@ -215,27 +215,28 @@ def make_contacts(features):
                 constants = model.half_pair[k]
                 owner = workspace.solid[constants.owner]
                 relative = owner if constants.kind == PLANE else workspace.relative[0]
+                # one array a loop, which LLVM copies as a whole
                 for i in range(LANES):
                     live.current_weight[i] = relative.current_weight[i]
+                for i in range(LANES):
                     live.current_normal_force[i] = relative.normal_force_sum[i]
+                for i in range(LANES):
                     live.current_impact[i] = relative.impact_sum[i]
+                for i in range(LANES):
                     live.current_closing[i] = relative.closing_sum[i]
         # after all of them, because the half-pairs of a pair read the last step of each other
         updates_memory = workspace.lane[0].updates_memory
+        everyone = all_update(updates_memory)
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:
-                # also makes the current normal force the previous one
-                record_contacts(model, state, workspace, k, live.current_normal_force, elapsed)
-                weight, impact, closing = (
-                    live.previous_weight,
-                    live.previous_impact,
-                    live.previous_closing,
+                force = live.current_normal_force
+                record_first_contact(model, state, workspace, k, force, elapsed)
+                update_previous(live.previous_normal_force, force, updates_memory, everyone)
+                update_previous(live.previous_weight, live.current_weight, updates_memory, everyone)
+                update_previous(live.previous_impact, live.current_impact, updates_memory, everyone)
+                update_previous(
+                    live.previous_closing, live.current_closing, updates_memory, everyone
                 )
-                for i in range(LANES):
-                    updates = updates_memory[i] != 0
-                    weight[i] = live.current_weight[i] if updates else weight[i]
-                    impact[i] = live.current_impact[i] if updates else impact[i]
-                    closing[i] = live.current_closing[i] if updates else closing[i]
 
     return contacts

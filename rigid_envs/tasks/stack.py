@@ -309,7 +309,9 @@ class Stack(Task):
         n = self.blocks
         # [blocks, 3, count]: NumPy is faster where the worlds come last, as in a readout
         cubes, places = (goals[:, :-1].T.reshape(n, 3, -1) for goals in (achieved, desired))
-        at_goal = np.array([distance(a.T, b.T) <= THRESHOLD for a, b in zip(cubes, places, strict=True)])
+        at_goal = np.array(
+            [distance(a.T, b.T) <= THRESHOLD for a, b in zip(cubes, places, strict=True)]
+        )
         # fingers that press on a cube from above do not hold it: closed fingers, or fingers around
         # a cube that stands on it
         same_height = np.abs(cubes[:, 2] - self.hand.position(now)[:, 2]) < HALF
