@@ -151,6 +151,15 @@ def load(model, state, workspace, chosen, g):
 
 
 @stage
+def find_waiting(lane):
+    """Finds out whether a lane has a world that isn't advanced now."""
+    waiting = 0
+    for i in range(LANES):
+        waiting += 1 if (lane.active[i] == 0) & (lane.world[i] >= 0) else 0
+    lane.waiting = waiting
+
+
+@stage
 def all_update(updates_memory):
     """Whether every lane updates its memory, as in nearly all steps of a full group."""
     updating = 0

@@ -52,7 +52,6 @@ SOLID = np.dtype(
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
         ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
-        ("updates_candidates", "f8", (LANES,)),  # 1 where they remember this step: not in a refresh
     ],
     align=True,
 )
@@ -128,6 +127,7 @@ LANE = np.dtype(
         ("active", "i8", (LANES,)),  # 0: no world, one that has diverged, or one not advanced
         ("needs_refresh", "i8", (LANES,)),
         ("updates_memory", "i8", (LANES,)),  # 0: inactive, or a refresh of other lanes passes by
+        ("waiting", "i8"),  # lanes that have a world, but aren't active
         ("start", "f8", (LANES,)),  # s, time at which this call began
         ("joint_unconverged", "i8", (LANES,)),  # 1: joints need another pass
         ("joint_residual", "f8", (LANES,)),  # largest violation, relative
@@ -258,6 +258,12 @@ def remembered_dtype(features: Features) -> np.dtype:
     return np.dtype([("sample_id", "i8"), ("memory", "f8", (size,))], align=True)
 
 
+@cached_by_features
+def saved_memory_dtype(features: Features) -> np.dtype:
+    """One row per slot of a half-pair: the memory of its candidates."""
+    return np.dtype([("memory", "f8", (contact_memory(features).size, LANES))], align=True)
+
+
 class Workspace(NamedTuple):
     """Working arrays of one call of a kernel; threads never share one.
 
@@ -268,6 +274,7 @@ class Workspace(NamedTuple):
         half_pair: [half-pairs] of HALF_PAIR_WORK.
         lane: [1] of LANE.
         old: [longest list of candidates] of remembered_dtype.
+        saved_memory: [longest list of candidates] of saved_memory_dtype; spring law.
         separation: [most samples of a half-pair] m, of the one that is being searched.
         tensor: [solids] of TENSOR, inverse inertia in the world frame; impulse law.
         contact_row: [slots] of CONTACT_ROW; impulse law.
@@ -287,6 +294,7 @@ class Workspace(NamedTuple):
     half_pair: Array
     lane: Array
     old: Array
+    saved_memory: Array
     separation: Array
     tensor: Array
     contact_row: Array
@@ -317,6 +325,7 @@ class Workspace(NamedTuple):
             half_pair=aligned_zeros(len(half_pair), HALF_PAIR_WORK),
             lane=aligned_zeros(1, LANE),
             old=np.zeros(longest, remembered_dtype(features)),
+            saved_memory=aligned_zeros(0 if impulse else longest, saved_memory_dtype(features)),
             separation=np.zeros(int(half_pair["sample_count"].max(initial=0))),
             tensor=aligned_zeros(solids if impulse else 0, TENSOR),
             contact_row=aligned_zeros(slots if impulse else 0, CONTACT_ROW),

@@ -66,7 +66,7 @@ def make_contact_loop(features, kind, report):
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
         calm_speeds, damped_speeds = relative.calm_per_load, relative.damped_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
-        current_weight, updates = relative.current_weight, relative.updates_candidates
+        current_weight = relative.current_weight
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals, axial = constants.face_normals != 0, constants.axial != 0
         overlap_share = constants.overlap_share
@@ -137,16 +137,13 @@ def make_contact_loop(features, kind, report):
                     memory[APPROACH, i],
                     weight > 0.0,
                 )
-                updates_memory = updates[i] != 0.0
-                memory[SPEED, i] = impact_speed if updates_memory else memory[SPEED, i]
-                memory[FORCE, i] = normal if updates_memory else memory[FORCE, i]
+                memory[SPEED, i] = impact_speed
+                memory[FORCE, i] = normal
                 # an empty slot stays empty, whatever the lane's state
-                kept = approach if weight > 0.0 else 0.0
-                memory[APPROACH, i] = kept if updates_memory else memory[APPROACH, i]
+                memory[APPROACH, i] = approach if weight > 0.0 else 0.0
                 current_weight[i] += weight if normal > 0.0 else 0.0
                 if has_faces:
-                    face = face if weight > 0.0 else 0.0
-                    memory[FACE, i] = face if updates_memory else memory[FACE, i]
+                    memory[FACE, i] = face if weight > 0.0 else 0.0
                 if plane:
                     fx, fy, fz = 0.0, 0.0, normal
                 else:
@@ -207,9 +204,9 @@ def make_contact_loop(features, kind, report):
                         fx += gx
                         fy += gy
                         fz += gz
-                        memory[SHEAR + 2, i] = sz if updates_memory else memory[SHEAR + 2, i]
-                    memory[SHEAR, i] = sx if updates_memory else memory[SHEAR, i]
-                    memory[SHEAR + 1, i] = sy if updates_memory else memory[SHEAR + 1, i]
+                        memory[SHEAR + 2, i] = sz
+                    memory[SHEAR, i] = sx
+                    memory[SHEAR + 1, i] = sy
                 if viscous:
                     gx, gy, gz = viscous_force(
                         normal,
@@ -240,9 +237,9 @@ def make_contact_loop(features, kind, report):
                         memory[TWIST + 1, i],
                         memory[TWIST + 2, i],
                     )
-                    memory[TWIST, i] = sx if updates_memory else memory[TWIST, i]
-                    memory[TWIST + 1, i] = sy if updates_memory else memory[TWIST + 1, i]
-                    memory[TWIST + 2, i] = sz if updates_memory else memory[TWIST + 2, i]
+                    memory[TWIST, i] = sx
+                    memory[TWIST + 1, i] = sy
+                    memory[TWIST + 2, i] = sz
                     torque[0, i] += tx * weight if weight > 0.0 else 0.0
                     torque[1, i] += ty * weight if weight > 0.0 else 0.0
                     torque[2, i] += tz * weight if weight > 0.0 else 0.0

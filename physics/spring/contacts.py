@@ -11,8 +11,14 @@ from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_gravity, relative_pose, relative_velocities
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import LANES, at, sequence, stage
+from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.model.lanes import all_update, record_first_contact, update_previous
+from physics.model.lanes import (
+    all_update,
+    find_waiting,
+    record_first_contact,
+    update_previous,
+)
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
 from physics.spring.contact_loop import make_contact_loop
@@ -46,6 +52,7 @@ def make_half_pair_of_kind(features, kind, report):
     begin_half_pair = make_begin_half_pair(features)
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
+    save_memory, restore_memory = make_keep_memory(features)
 
     @sequence
     def half_pair(model, state, workspace, rows, g, k, h):
@@ -74,11 +81,42 @@ def make_half_pair_of_kind(features, kind, report):
         # face that each candidate remembers. Not in a refresh, where h = 0
         if box and constants.face_normals == 0 and h > 0.0:
             correct_energy(slots, candidate, relative, constants, h)
+        # nearly always all candidates remember this step, so the loop doesn't ask
+        lane, saved = workspace.lane[0], workspace.saved_memory
+        keeps = h == 0.0 or lane.waiting != 0
+        if keeps:
+            save_memory(candidate, slots, saved)
         contact_loop(slots, candidate, relative, constants, h, out)
+        if keeps:
+            restore_memory(candidate, slots, saved, lane.active, h)
         if not plane:
             add_wrenches(owner, surface, frame, relative)
 
     return half_pair
+
+
+@cached_by_features
+def make_keep_memory(features):
+    """Stages that save the memory of candidates and restore it where a step doesn't count."""
+    size = contact_memory(features).size
+
+    @stage
+    def save_memory(candidate, slots, saved):
+        for n in range(slots):
+            for row in range(size):
+                for i in range(LANES):
+                    saved[n].memory[row, i] = candidate[n].memory[row, i]
+
+    @stage
+    def restore_memory(candidate, slots, saved, active, h):
+        """In a refresh (h = 0) that is all lanes, else those that aren't active."""
+        for n in range(slots):
+            for row in range(size):
+                for i in range(LANES):
+                    if h == 0.0 or active[i] == 0:
+                        candidate[n].memory[row, i] = saved[n].memory[row, i]
+
+    return save_memory, restore_memory
 
 
 @cached_by_features
@@ -98,15 +136,10 @@ def make_begin_half_pair(features):
 
         m is the pair mass and h the step. W is the sum of the weights of the samples that were in
         contact in the last step, over all half-pairs of the pair, and F their normal force. The
-        results are zero where nothing was in contact. Candidates keep their memory in a refresh
-        (h = 0) and in lanes that aren't advanced. All of it is written to `relative`, one array,
-        because LLVM checks before every run of the loop that its arrays don't overlap.
+        results are zero where nothing was in contact. All of it is written to `relative`, one
+        array, because LLVM checks before every run of the loop that its arrays don't overlap.
         """
-        live, half_pair, active = (
-            workspace.half_pair[k],
-            model.half_pair[k],
-            workspace.lane[0].active,
-        )
+        live, half_pair = workspace.half_pair[k], model.half_pair[k]
         # without a reverse half-pair (-1) row 0 is named, and not read
         other = workspace.half_pair[max(half_pair.reverse, 0)]
         pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
@@ -145,7 +178,6 @@ def make_begin_half_pair(features):
             relative.inverse_mean_force[i] = weight * inverse
             relative.mean_impact_speed[i] = impact * inverse
             relative.impact_ratio[i] = impact / closing if closing > _LEAST_FORCE else 0.0
-            relative.updates_candidates[i] = 1.0 if (active[i] != 0) & (h > 0.0) else 0.0
             relative.current_weight[i] = 0.0
             relative.normal_force_sum[i] = 0.0
             relative.impact_sum[i] = 0.0
@@ -208,6 +240,7 @@ def make_contacts(features):
 
     @sequence
     def contacts(model, state, workspace, g, h, drifted, elapsed):
+        find_waiting(workspace.lane[0])
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:
