@@ -5,6 +5,13 @@ kick, a drift, new forces, half a kick. Forces that depend on velocity see the h
 the drift. Without torque L stays bitwise constant while omega = J^-1 L does not: the midpoint rule
 rotates by the omega that belongs to the orientation half a step ahead.
 
+The omega half a step ahead is unknown. Starting from the present one, rotation by half a step gives
+o1, the explicit midpoint rule, and rotation by half a step of o1 gives o2. Further iterates converge
+to the implicit rule, whose energy error stays bounded. Those of o1 and o2 are of the same size and
+opposite sign up to terms of higher order: with the asymmetric top of the tests and steps of 1 ms,
++1.99e-6 and -1.99e-6 after 10^6 steps. Their mean is used: the energy stays within 2e-10 of its
+value for 10^7 steps, a thousandth of what the implicit rule's swings by (docs/integrators.md).
+
 The midpoint rule does not conserve energy where L would rotate the body by a large angle about its
 slimmest axis. Such a rotation is made in up to MOST_PARTS parts of at most SMALL_ROTATION,
 0.3 rad, which suffices for 30 rad per substep (see drift.py; evidence: docs/decisions).
@@ -31,7 +38,10 @@ def make_midpoint_rotation(features, rotate_quaternion):
             half = 0.5 * time
             ox, oy, oz = angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz)
             hx, hy, hz, hw = rotate_quaternion(x, y, z, w, half * ox, half * oy, half * oz)
+            px, py, pz = angular_velocity_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
+            hx, hy, hz, hw = rotate_quaternion(x, y, z, w, half * px, half * py, half * pz)
             ox, oy, oz = angular_velocity_of(hx, hy, hz, hw, jx, jy, jz, lx, ly, lz)
+            ox, oy, oz = 0.5 * (px + ox), 0.5 * (py + oy), 0.5 * (pz + oz)
         else:  # equal moments: omega is parallel to L
             ox, oy, oz = jx * lx, jx * ly, jx * lz
         x, y, z, w = rotate_quaternion(x, y, z, w, time * ox, time * oy, time * oz)

@@ -224,8 +224,7 @@ def _features(
         any(f.point) or any(f.to_point) for f in scene.fields if isinstance(f, PointSpring)
     )
     moments = model.dynamic["inertia"][: len(scene.bodies)]
-    # the impulse law needs every inertia tensor in the world frame anyway
-    isotropic = bool(np.all(moments == moments[:, :1])) and not impulse
+    isotropic = bool(np.all(moments == moments[:, :1]))
     resistance = bool(np.any(model.half_pair["rolling"] + model.half_pair["spinning"] > 0.0))
     rotation = (
         NO_ROTATION

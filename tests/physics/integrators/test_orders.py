@@ -97,15 +97,16 @@ def test_drag_slows_a_body_with_its_order(integrator):
 
 @pytest.mark.parametrize(
     ("integrator", "drift"),
-    [("midpoint", 3e-7), ("euler", np.inf), ("rk4", 1e-12), ("adaptive", 1e-12)],
+    [("midpoint", 5e-10), ("euler", np.inf), ("rk4", 1e-12), ("adaptive", 1e-12)],
 )
 def test_a_long_run_keeps_the_quaternion_the_momentum_and_almost_the_energy(
     integrator, drift, stress
 ):
-    """100,000 steps of 1 ms, 10,000,000 with `make stress`: the drift may be 100 times as large.
+    """100,000 steps of 1 ms, 10,000,000 with `make stress`: a drift may be 100 times as large.
 
-    `drift` is that of the energy, relative. Euler's is no error of round-off or of long times, but
-    of the first order: it reaches a fifth in the short form.
+    `drift` is that of the energy, relative. Midpoint's energy swings, but does not drift. Euler's
+    is no error of round-off or of long times, but of the first order: it reaches a fifth in the
+    short form.
     """
     frames = 1000 if stress else 10
     world = world_of(TOP, integrator, 1e-3, tolerance=1e-6)
@@ -114,7 +115,8 @@ def test_a_long_run_keeps_the_quaternion_the_momentum_and_almost_the_energy(
         world.advance(10.0)
         assert abs(np.linalg.norm(world.orientation) - 1.0) < 1e-15
         np.testing.assert_array_equal(world.angular_momentum(), momentum)
-    assert abs(float(world.kinetic_energy()[0]) / energy - 1.0) < drift * frames / 10
+    growth = 1 if integrator == "midpoint" else frames / 10
+    assert abs(float(world.kinetic_energy()[0]) / energy - 1.0) < drift * growth
 
 
 @pytest.mark.parametrize("integrator", ["midpoint", "euler"])
