@@ -173,8 +173,7 @@ class World:
             velocity: [count, drives, 3] m/s, or what broadcasts to it; it holds until the next
                 command. The two fingers of a gripper count as two drives.
         """
-        shape = (self.count, len(self.scene.driven_bodies), 3)
-        checked = array("velocity", velocity, shape)
+        checked = array("velocity", velocity, self._drives_shape("command_drives"))
         simulation = self._simulation
         make_velocity_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked))
         simulation.changed()
@@ -189,12 +188,17 @@ class World:
             target: [count, drives, 3] m, or what broadcasts to it.
             time: s, duration of the motion.
         """
-        shape = (self.count, len(self.scene.driven_bodies), 3)
-        checked = array("target", target, shape)
+        checked = array("target", target, self._drives_shape("move_drives"))
         time = positive("time", time)
         simulation = self._simulation
         make_move_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked), time)
         simulation.changed(poses=False)
+
+    def _drives_shape(self, method: str) -> tuple[int, int, int]:
+        """Shape of a vector for every drive in every world; an error if there are no drives."""
+        if not self.scene.drives:
+            raise ValueError(f"World.{method} needs a Drive or Gripper in Scene.drives")
+        return self.count, len(self.scene.driven_bodies), 3
 
     def apply_wrench(
         self,

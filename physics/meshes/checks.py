@@ -35,8 +35,8 @@ def check_solid_mesh(vertices: Array, faces: Array) -> None:
     """
     if len(faces) < 4:
         raise ValueError(
-            f"Mesh.faces must enclose a volume, got {len(faces)} triangles with three different "
-            "corners"
+            "Mesh must be closed: at least 4 triangles with three different corners each enclose a "
+            f"volume, got {len(faces)}"
         )
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     forward = ends[:, 0] < ends[:, 1]

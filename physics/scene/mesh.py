@@ -71,7 +71,9 @@ class Mesh:
         """Reads and checks the mesh."""
         given = (self.vertices is not None, self.faces is not None)
         if given not in ((True, True), (False, False)) or given[0] == (source is not None):
-            raise TypeError("Mesh takes a source, or vertices and faces")
+            named = zip(("source", "vertices", "faces"), (source is not None, *given), strict=True)
+            got = " and ".join(name for name, there in named if there) or "none of them"
+            raise TypeError(f"Mesh takes either a source or vertices and faces, got {got}")
         vertices, faces = read_mesh(source) if source is not None else (self.vertices, self.faces)
         try:
             points = np.asarray(vertices, dtype=float)

@@ -7,7 +7,7 @@ import numpy as np
 
 from physics.rotation import rotation_matrix
 from physics.scene.shapes import Box, Capsule, Sphere
-from physics.scene.validation import instance, unit_quaternion, vector
+from physics.scene.validation import unit_quaternion, vector
 
 Array = np.ndarray
 Simple = Sphere | Box | Capsule
@@ -35,7 +35,11 @@ class Part:
 
     def __post_init__(self) -> None:
         """Checks every field."""
-        instance("Part.shape", self.shape, Sphere, Box, Capsule)
+        if not isinstance(self.shape, Sphere | Box | Capsule):
+            raise TypeError(
+                f"Part.shape must be Sphere or Box or Capsule, got {self.shape!r} "
+                f"({type(self.shape).__name__}); other bodies of several parts: a Mesh"
+            )
         object.__setattr__(self, "position", vector("Part.position", self.position))
         orientation = unit_quaternion("Part.orientation", self.orientation)
         object.__setattr__(self, "orientation", orientation)

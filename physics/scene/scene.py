@@ -131,9 +131,15 @@ class Scene:
         if isinstance(index, int) and 0 <= index < len(names) and index not in fingers:
             return a, index
         listed = ", ".join(repr(name) for i, name in enumerate(names) if i not in fingers)
+        statics = self.solid_names[len(names) :]
+        why = ""
+        if joint.b in statics:
+            why = ", which never moves: None holds a body just as well"
+        elif index in fingers or joint.b in [gripper.name for _, gripper in self.grippers]:
+            why = ", a Gripper, whose fingers can't have joints: use a Drive"
         raise ValueError(
             f"{field}b must be None for the world, or the name or index of a body or Drive, got "
-            f"{joint.b!r}; there are: {listed}"
+            f"{joint.b!r}{why}; there are: {listed}"
         )
 
     def distance_anchors(self, joint: Distance) -> tuple[Vector, Vector]:
@@ -165,8 +171,10 @@ class Scene:
         if isinstance(body, int) and 0 <= body < len(names):
             return body
         listed = ", ".join(repr(name) for name in names) or "none"
+        others = self.solid_names[len(names) :]
+        which = ", which is a drive or static" if body in others else ""
         raise ValueError(
-            f"{field} must be the name or index of a body, got {body!r}; there are: {listed}"
+            f"{field} must be the name or index of a body, got {body!r}{which}; there are: {listed}"
         )
 
     def to_json(self) -> str:

@@ -42,7 +42,8 @@ def write_motors(simulation: Simulation, name: str, values: Any) -> None:
     """
     motor = simulation.state.motor
     if motor.shape[1] == 0:
-        raise ValueError(f"{name} needs a Hinge or Slider with a Motor in Scene.joints")
+        method = "command_motors" if name == "velocity" else "move_motors"
+        raise ValueError(f"World.{method} needs a Hinge or Slider with a Motor in Scene.joints")
     checked = array(name, values, motor.shape[:2])
     motor[..., 0] = checked if name == "velocity" else 0.0
     motor[..., 1] = checked if name == "position" else np.nan
