@@ -155,7 +155,8 @@ class Fidelity:
             if getattr(self, name) != only:
                 raise ValueError(
                     f"Fidelity.time_control {self.time_control!r} requires {name}={only!r}, got "
-                    f"{getattr(self, name)!r}: {why}; or use time_control='fixed' with a shorter substep"
+                    f"{getattr(self, name)!r}: {why}; or use time_control='fixed' with a shorter "
+                    "substep"
                 )
 
     def to_json(self) -> str:
