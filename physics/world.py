@@ -172,6 +172,9 @@ class World:
         Args:
             velocity: [count, drives, 3] m/s, or what broadcasts to it; it holds until the next
                 command. The two fingers of a gripper count as two drives.
+
+        Raises:
+            ValueError: a wrong shape, a value that isn't finite, or a scene without drives.
         """
         checked = array("velocity", velocity, self._drives_shape("command_drives"))
         simulation = self._simulation
@@ -187,6 +190,10 @@ class World:
         Args:
             target: [count, drives, 3] m, or what broadcasts to it.
             time: s, duration of the motion.
+
+        Raises:
+            TypeError, ValueError: a wrong shape, a value that isn't finite, a time that isn't above
+                zero, or a scene without drives.
         """
         checked = array("target", target, self._drives_shape("move_drives"))
         time = positive("time", time)

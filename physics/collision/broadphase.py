@@ -146,3 +146,23 @@ def make_forget(features):
             lane.updates_memory[i] = 1 if lane.needs_refresh[i] == STARTS_ANEW else 0
 
     return forget
+
+
+@cached_by_features
+def make_clear_rest(features):
+    """Stage that empties the slots behind the lists of lane i, whose world has diverged.
+
+    The impulse law works on all slots up to the longest list of a group, and NaN velocities leave
+    NaN in those that should be empty. Neither `forget` nor `lane_order` looks there.
+    """
+    clear, impulse = make_clear(features), features.impulse
+
+    @stage
+    def clear_rest(model, state, workspace, g, i):
+        if impulse:
+            for k in range(model.half_pair.shape[0]):
+                half_pair = model.half_pair[k]
+                for n in range(workspace.half_pair[k].count[i], half_pair.slot_count):
+                    clear(state.candidate[g, half_pair.first_slot + n], i)
+
+    return clear_rest

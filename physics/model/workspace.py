@@ -46,8 +46,6 @@ SOLID = np.dtype(
         ("impact_ratio", "f8", (LANES,)),  # of impact speed to rate
         ("inverse_mass", "f8", (LANES,)),  # 1/kg, of the pair mass
         ("speed_per_load", "f8", (LANES,)),  # m/s per N
-        ("calm_per_load", "f8", (LANES,)),  # m/s per N
-        ("damped_per_load", "f8", (LANES,)),  # m/s per N
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step

@@ -48,6 +48,9 @@ def write_drive_frames(model, workspace):
         if not model.dynamic[m].is_body:
             solid = workspace.solid[m]
             for i in range(LANES):
+                # `kinematics` computes it too, but time control looks ahead before that
+                for c in range(3):
+                    solid.angular_velocity[c, i] = 0.0
                 write_rotation(solid, i)
 
 

@@ -15,11 +15,7 @@ from physics.model.features import cached_by_features
 from physics.scene.shapes import BOX, CYLINDER, PLANE
 from physics.spring.coulomb import friction_force, is_set_down, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
-from physics.spring.hunt_crossley import (
-    calm_speed_per_load,
-    dashpot_force,
-    hunt_crossley_force,
-)
+from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
 
 # one row per slot: what `World.contacts` reports of the candidates there
 REPORT = np.dtype(
@@ -64,7 +60,6 @@ def make_contact_loop(features, kind, report):
         mean_impact_speeds, impact_ratios = relative.mean_impact_speed, relative.impact_ratio
         impact_sum, closing_sum = relative.impact_sum, relative.closing_sum
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
-        calm_speeds, damped_speeds = relative.calm_per_load, relative.damped_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
         current_weight = relative.current_weight
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
@@ -84,8 +79,7 @@ def make_contact_loop(features, kind, report):
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
                 share = at(overlap_share, i)
-                inverse_mass = inverse_masses[i]
-                calm_per_load, damped_per_load = calm_speeds[i], damped_speeds[i]
+                inverse_mass, speed_per_load = inverse_masses[i], speeds_per_load[i]
                 rx, ry, rz, nx, ny, nz, penetration, face = touch(
                     row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals, axial
                 )
@@ -106,9 +100,7 @@ def make_contact_loop(features, kind, report):
                     inverse_mass += rotational
                     lighter = 1.0 + mass * rotational
                     load_rate *= 1.0 / lighter
-                    speed_per_load = speeds_per_load[i] * math.sqrt(lighter)
-                    calm_per_load = calm_speed_per_load(a, speed_per_load)
-                    damped_per_load = a * speed_per_load
+                    speed_per_load *= math.sqrt(lighter)
                 ux = v[0, i] + omega[1, i] * rz - omega[2, i] * ry
                 uy = v[1, i] + omega[2, i] * rx - omega[0, i] * rz
                 uz = v[2, i] + omega[0, i] * ry - omega[1, i] * rx
@@ -125,8 +117,7 @@ def make_contact_loop(features, kind, report):
                     a,
                     floor,
                     inverse_mass,
-                    calm_per_load,
-                    damped_per_load,
+                    speed_per_load,
                     h,
                     load_rate,
                     inverse_mean_forces[i],

@@ -23,7 +23,6 @@ from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
 from physics.spring.contact_loop import make_contact_loop
 from physics.spring.energy_correction import make_energy_correction
-from physics.spring.hunt_crossley import calm_speed_per_load
 
 # N; below this normal force of a pair, weight / force could overflow
 _LEAST_FORCE = 1e-200
@@ -170,10 +169,7 @@ def make_begin_half_pair(features):
             known = weight if weight > 0.0 else 1.0
             square = known * spring * (h * h) / mass
             square = min(square, 4.0)  # beyond it no step is stable
-            a = at(damping, i) * (1.0 - at(errors, i) * square)
-            relative.damping[i] = a
-            relative.calm_per_load[i] = calm_speed_per_load(a, relative.speed_per_load[i])
-            relative.damped_per_load[i] = a * relative.speed_per_load[i]
+            relative.damping[i] = at(damping, i) * (1.0 - at(errors, i) * square)
             inverse = 1.0 / force if force > _LEAST_FORCE else 0.0
             relative.inverse_mean_force[i] = weight * inverse
             relative.mean_impact_speed[i] = impact * inverse

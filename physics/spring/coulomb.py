@@ -135,9 +135,12 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wou
     inverse = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz + 1e-60)
     limit = mu * normal
     cut = min(1.0, limit * inverse)
-    rx = fx * cut
-    ry = fy * cut
-    rz = fz * cut
+    grips, touches = limit > 0.0, normal > 0.0
+    # Without grip these are zero anyway. As plain products they could be fused with a sum, or the
+    # other product of that sum could: which one LLVM chose differed with per-world parameters
+    rx = fx * cut if grips else 0.0
+    ry = fy * cut if grips else 0.0
+    rz = fz * cut if grips else 0.0
     if wound is None:
         fx, fy, fz = rx, ry, rz
     else:
@@ -145,13 +148,12 @@ def friction_force(normal, ux, uy, uz, k, c, mu, h, sx, sy, sz, persistence, wou
         most = math.sqrt(wx * wx + wy * wy + wz * wz)
         most = most if fx * wx + fy * wy + fz * wz < 0.0 else 0.0
         remembered = min(1.0, max(limit, most) * inverse)
-        fx *= remembered
-        fy *= remembered
-        fz *= remembered
+        fx = fx * remembered if grips else 0.0
+        fy = fy * remembered if grips else 0.0
+        fz = fz * remembered if grips else 0.0
     # forgotten after the step, not before: the trial force need not wait for the normal law
     lasting = persistence * persistence
     damped = c * min(1.0, (1.0 + _AT_REST * lasting) * limit * inverse)
-    touches = normal > 0.0
     sx = lasting * (fx + damped * ux) if touches else 0.0
     sy = lasting * (fy + damped * uy) if touches else 0.0
     sz = lasting * (fz + damped * uz) if touches else 0.0

@@ -63,12 +63,6 @@ _CALM = 2.0
 
 
 @stage
-def calm_speed_per_load(a, speed_per_load):
-    """Impact speed, per N of load, up to which a contact lasts; `speed_per_load` is 1/(m omega)."""
-    return max(a, _CALM) * speed_per_load
-
-
-@stage
 def hunt_crossley_force(
     penetration,
     approach,
@@ -76,8 +70,7 @@ def hunt_crossley_force(
     a,
     floor,
     inverse_mass,
-    calm_per_load,
-    damped_per_load,
+    speed_per_load,
     h,
     load_rate,
     inverse_mean_force,
@@ -98,8 +91,7 @@ def hunt_crossley_force(
         floor: m/s, lower bound of the impact speed.
         inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
             of the effective mass at its contact point, to which rotation contributes.
-        calm_per_load: m/s per N, see `calm_speed_per_load`.
-        damped_per_load: m/s per N, a/(m omega) of the mass of `inverse_mass`.
+        speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
         h: s.
         load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
@@ -128,12 +120,13 @@ def hunt_crossley_force(
     # after turning around it is negative while the sample approaches, and `approach` is larger
     remembered = impact_speed if approach > 0.0 else abs(impact_speed)
     speed = max(max(joined if begins else remembered, approach), floor)
+    calm_per_load = max(a, _CALM) * speed_per_load
     change = load_rate * (approach - previous_approach)
     by_force = previous_force + change * (previous_force * inverse_mean_force)
     lasts = speed <= max(floor, calm_per_load * by_force)
     load = previous_force + change if lasts else by_force
     load = 0.0 if begins else max(min(load, k * penetration), 0.0)
-    v = max(speed, damped_per_load * load)
+    v = max(speed, a * speed_per_load * load)
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
@@ -160,8 +153,7 @@ def dashpot_force(
     zeta,
     floor,
     inverse_mass,
-    calm_per_load,
-    damped_per_load,
+    speed_per_load,
     h,
     load_rate,
     inverse_mean_force,

@@ -8,7 +8,7 @@ collision step.
 import math
 from functools import cache
 
-from physics.collision.broadphase import make_forget
+from physics.collision.broadphase import make_clear_rest, make_forget
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
@@ -48,6 +48,7 @@ def first_diverged(model, workspace, i):
 def make_write_back(features: Features):
     """Stage that stores lanes into their worlds: diverged ones at once, all after the frame."""
     write_rows, end_call = make_write_rows(features), make_end_call(features)
+    clear_rest = make_clear_rest(features)
 
     @stage
     def write_back(model, state, workspace, table, g, elapsed, last):
@@ -62,6 +63,9 @@ def make_write_back(features: Features):
                     state.world[w].needs_refresh = end_call(model, workspace, i)
                     state.world[w].diverged = diverged
                     lane.active[i] = 0
+                    if diverged != 0:
+                        lane.updates_memory[i] = 0
+                        clear_rest(model, state, workspace, g, i)
 
     return write_back
 

@@ -630,6 +630,20 @@ def test_a_diverging_world_is_named_and_the_others_go_on():
     assert np.all(np.isfinite(world.position))
 
 
+def test_a_world_that_diverged_starts_anew_beside_one_in_contact():
+    """The impulse law works on as many slots as the neighbour fills, with NaN velocities too."""
+    scene = scenes.block_on_ground(position=(0.0, 0.0, 1.0))
+    world, mask = World(scene, "solid", count=2), np.array([True, False])
+    world.set_state(position=(0.0, 0.0, 0.02), worlds=~mask)
+    world.advance(0.1)
+    world.set_state(angular_velocity=(1e200, 1e200, 0.0), worlds=mask)
+    with pytest.raises(SimulationDiverged):
+        world.advance(0.1)
+    world.reset(mask)
+    world.advance(0.1)
+    assert world.position[0, 0, 2] == pytest.approx(1.0 - 0.5 * 9.81 * 0.1**2, rel=1e-3)
+
+
 def test_a_step_that_is_too_long_is_named_as_the_cause():
     scene = scenes.block_on_ground(restitution=1.0, stiffness=1e9)
     world = World(scene, allow_unstable=True)
