@@ -77,12 +77,15 @@ def _take_impulses_back(model, workspace):
 
 @stage
 def _judge(lane):
-    """Ends lanes whose violation hasn't at least halved; returns how many are left."""
+    """Ends lanes whose violation hasn't at least halved; returns how many are left.
+
+    A lane that has ended is judged again while others go on, and must end again.
+    """
     left = 0
     for i in range(LANES):
-        halved = lane.joint_residual[i] <= 0.5 * lane.joint_before[i]
+        halved = lane.joint_residual[i] <= 0.5 * lane.joint_before[i] and lane.joint_stuck[i] == 0
         if lane.joint_unconverged[i] != 0 and not halved:
-            lane.joint_stuck[i] = 0 if lane.joint_residual[i] <= NEARLY_EXACT else 1
+            lane.joint_stuck[i] |= 0 if lane.joint_residual[i] <= NEARLY_EXACT else 1
             lane.joint_unconverged[i] = 0
         lane.joint_before[i] = lane.joint_residual[i]
         left += lane.joint_unconverged[i]
@@ -127,8 +130,9 @@ def make_joint_drift(features):
                     break
             stuck = 0
             for i in range(LANES):
-                lane.joint_unconverged[i] = lane.joint_unconverged[i] | lane.joint_stuck[i]
-                stuck += lane.joint_unconverged[i]
+                lane.joint_stuck[i] |= lane.joint_unconverged[i]
+                lane.joint_unconverged[i] = lane.joint_stuck[i]
+                stuck += lane.joint_stuck[i]
             if stuck > 0:
                 _take_impulses_back(model, workspace)
                 _restore_poses(model, workspace)

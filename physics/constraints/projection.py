@@ -75,6 +75,16 @@ def _move(model, workspace, time):
 
 
 @stage
+def _leave_out_others(lane):
+    """Leaves lanes as they are that need no projection; returns how many others are left."""
+    left = 0
+    for i in range(LANES):
+        lane.joint_unconverged[i] &= lane.joint_stuck[i]
+        left += lane.joint_unconverged[i]
+    return left
+
+
+@stage
 def _save_momenta(model, workspace):
     for m in range(model.dynamic.shape[0]):
         solid, start = workspace.solid[m], workspace.start[m]
@@ -86,27 +96,34 @@ def _save_momenta(model, workspace):
 
 @stage
 def _fail(model, workspace):
-    """Makes unconverged lanes count as diverged, at the body of the first row that fails."""
+    """Makes unconverged lanes count as diverged, at the body of the first joint that fails.
+
+    A limit that is still passed doesn't fail: it pushes back in the next step.
+    """
     unconverged = workspace.lane[0].joint_unconverged
     for r in range(model.joint_row.shape[0]):
         row, work = model.joint_row[r], workspace.joint[r]
-        momentum, scale = workspace.solid[row.a].momentum, row.scale
+        momentum = workspace.solid[row.a].momentum
+        position = workspace.solid[row.a].position
         for i in range(LANES):
-            if unconverged[i] != 0 and row.role == EQUALITY and abs(work.value[i]) > FAILED * scale:
+            far = abs(position[0, i]) + abs(position[1, i]) + abs(position[2, i])
+            holds = abs(work.value[i]) <= FAILED * (row.scale + far)
+            if unconverged[i] != 0 and row.role == EQUALITY and not holds:
                 momentum[0, i] = math.nan
                 unconverged[i] = 0
 
 
 @cached_by_features
 def make_projection(features):
-    """Stage that moves the bodies of unconverged lanes onto the joints, after a free drift."""
+    """Stage that moves the bodies of stuck lanes onto the joints, after a free drift."""
 
     @stage
     def project(model, workspace, time):
         for _ in range(_MOST_ITERATIONS):
             write_rotations(model, workspace)
             linearise_rows(model, workspace)
-            if find_violations(model, workspace, EXACT) == 0:
+            find_violations(model, workspace, EXACT)
+            if _leave_out_others(workspace.lane[0]) == 0:
                 break
             factor(model, workspace)
             _save_momenta(model, workspace)
@@ -114,7 +131,8 @@ def make_projection(features):
             _move(model, workspace, time)
         write_rotations(model, workspace)
         measure_rows(model, workspace)
-        if find_violations(model, workspace, FAILED) > 0:
+        find_violations(model, workspace, FAILED)
+        if _leave_out_others(workspace.lane[0]) > 0:
             _fail(model, workspace)
 
     return project

@@ -141,9 +141,9 @@ def load(model, state, workspace, chosen, g):
     for m in range(model.dynamic.shape[0]):
         weight = workspace.solid[m].weight
         for c in range(3):
-            w = model.dynamic[m].weight[c]
+            value = model.dynamic[m].weight[c]
             for i in range(LANES):
-                weight[c, i] = at(w, i)
+                weight[c, i] = at(value, i)
     for k in range(model.half_pair.shape[0]):
         count_slots(workspace, k)
         count_untouched(workspace, k)

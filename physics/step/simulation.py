@@ -317,12 +317,14 @@ class Simulation:
         self._readout = make_readout(self.features)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All attributes but the kernels, which follow from the features."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_advance", "_readout")}
+        """All attributes but kernels and working arrays, which follow from the features."""
+        left_out = ("_advance", "_readout", "_idle")
+        return {k: v for k, v in self.__dict__.items() if k not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restores the attributes and finds the kernels."""
         self.__dict__.update(state)
+        self._idle = []
         self._find_kernels()
 
 

@@ -133,7 +133,7 @@ def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
     root, cache, (_, _, height) = copied
     path = root / "physics" / "motion" / "gravity.py"
     source = path.read_text()
-    line = "force[2, i] = at(wz, i)"
+    line = "force[axis, i] = weight[axis, i]"
     assert line in source
     path.write_text(source.replace(line, f"{line} * 2.0"))
     assert run(FALL, cache, root) == pytest.approx([0.0, 1.0, 2.0 * height], rel=1e-12)

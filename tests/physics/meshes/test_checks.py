@@ -38,14 +38,14 @@ def test_a_flat_mesh_has_no_volume():
 @pytest.mark.parametrize(
     ("settings", "error", "message"),
     [
-        ({}, TypeError, "a source, or vertices and faces"),
-        ({"vertices": VERTICES}, TypeError, "a source, or vertices and faces"),
+        ({}, TypeError, "either a source or vertices and faces"),
+        ({"vertices": VERTICES}, TypeError, "either a source or vertices and faces"),
         ({"vertices": VERTICES[:, :2], "faces": FACES}, ValueError, r"\(n, 3\), got \(8, 2\)"),
         ({"vertices": VERTICES * np.nan, "faces": FACES}, ValueError, "must be finite"),
         ({"vertices": VERTICES, "faces": FACES + 1}, ValueError, "of the vertices, got 1 to 8"),
         ({"vertices": VERTICES, "faces": FACES * 1.0}, TypeError, "must be integers, got float64"),
         ({"vertices": VERTICES, "faces": FACES[:, :2]}, ValueError, r"triangles of shape \(m, 3\)"),
-        ({"vertices": VERTICES, "faces": FACES[:2]}, ValueError, "got 2 triangles"),
+        ({"vertices": VERTICES, "faces": FACES[:2]}, ValueError, "enclose a volume, got 2"),
         ({"vertices": VERTICES, "faces": FACES, "scale": 0.0}, ValueError, "Mesh.scale"),
         ({"vertices": VERTICES, "faces": FACES, "cells": 4}, ValueError, "Mesh.cells must be at"),
         ({"vertices": VERTICES, "faces": FACES, "fill": "full"}, ValueError, "'shell', 'solid'"),

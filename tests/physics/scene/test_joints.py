@@ -87,7 +87,7 @@ def test_poses_that_violate_a_joint_are_refused_and_change_nothing():
     quarter = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
     world.set_state(position=(0.1, -0.1, 0.0), orientation=quarter)
     assert world.joint_position()[2, 0] == pytest.approx(0.5 * math.pi)
-    with pytest.raises(ValueError, match="velocity needs a Hinge or Slider with a Motor"):
+    with pytest.raises(ValueError, match="command_motors needs a Hinge or Slider with a Motor"):
         world.command_motors(1.0)
 
 
