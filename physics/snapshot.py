@@ -1,6 +1,6 @@
 """Snapshots: the complete state of worlds, saved and restored."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,17 @@ class Snapshot(NamedTuple):
     fidelity: Fidelity
     state: State
     parameters: Parameters | None = None  # of worlds with per-world parameters
+    hidden: Any = None  # of worlds of many bodies: their pairs
 
 
 def save(simulation: Simulation) -> Snapshot:
     """A snapshot of all worlds."""
     everyone, own = simulation.everyone, simulation.parameters
     parameters = own.pick(everyone) if simulation.features.per_world_parameters else None  # a copy
-    return Snapshot(simulation.scene, simulation.fidelity, copy(simulation.state), parameters)
+    return Snapshot(
+        simulation.scene, simulation.fidelity, copy(simulation.state), parameters,
+        simulation.saved(),
+    )  # fmt: skip
 
 
 def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | None) -> None:
@@ -58,6 +62,7 @@ def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | N
     for name in saved.state._fields:
         if name != "wrench":
             getattr(simulation.state, name)[...] = getattr(saved.state, name)
+    simulation.restore(saved.hidden)
     simulation.changed()
 
 

@@ -7,13 +7,17 @@ from typing import Any
 import numpy as np
 
 from physics import snapshot
-from physics.analysis import diagnostics, energies, field_limits, joints, readouts, stability
+from physics.analysis import energies, field_limits, joints, readouts
 from physics.analysis.diagnostics import Contacts
 from physics.analysis.failures import failure
 from physics.analysis.integrator_limits import check_integrator
+from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
+from physics.manybody.limits import check_crowd
+from physics.manybody.queries import CrowdQueries
+from physics.manybody.simulation import CrowdSimulation, is_crowd
 from physics.model.features import Features
 from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.scene.fidelity import Fidelity, resolve
@@ -66,14 +70,22 @@ class World:
         self.threads = check_threads(threads)
         per_world_parameters = instance("per_world_parameters", per_world_parameters, bool)
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
-        self._simulation = Simulation(
-            scene, self.fidelity, self.count, self.threads, per_world_parameters
-        )
-        check_integrator(scene, self.fidelity, self._simulation.base)
-        if not allow_unstable:
-            check_step(scene, self.fidelity, self._simulation.base, self.features)
+        arguments = scene, self.fidelity, self.count, self.threads, per_world_parameters
+        self._simulation: Simulation
+        self._queries: LaneQueries | CrowdQueries
+        if is_crowd(scene, self.fidelity, per_world_parameters):
+            crowd = CrowdSimulation(*arguments)
+            self._simulation, self._queries = crowd, CrowdQueries(crowd)
+            if not allow_unstable:
+                check_crowd(scene, self.fidelity, crowd.kinds)
+        else:
+            self._simulation = Simulation(*arguments)
+            self._queries = LaneQueries(self._simulation)
+            check_integrator(scene, self.fidelity, self._simulation.base)
+            if not allow_unstable:
+                check_step(scene, self.fidelity, self._simulation.base, self.features)
         self._limits = ParameterLimits(scene, self.fidelity)
-        self._solids = Solids(scene.solid_names, self._simulation.base)
+        self._solids = Solids(scene.solid_names, self._queries.can_touch)
 
     def __repr__(self) -> str:
         """Names the contents of the world."""
@@ -506,16 +518,12 @@ class World:
     def penetration(self) -> Array:
         """[count] m, deepest penetration now; 0 where nothing touches."""
         self._refresh()
-        simulation = self._simulation
-        return diagnostics.penetration(simulation.model, self.features, simulation.state)
+        return self._queries.penetration()
 
     def contacts(self, world: int = 0) -> Contacts:
         """What touches what in one world, where and how hard."""
         self._refresh()
-        simulation, index = self._simulation, self._world_index(world)
-        return diagnostics.contacts(
-            simulation.model, self.features, simulation.state, index, self.scene.solid_names
-        )
+        return self._queries.contacts(self._world_index(world), self.scene.solid_names)
 
     def index(self, name: str) -> int:
         """Index of the solid with this name: bodies, then drives, then statics, in scene order.
@@ -537,7 +545,7 @@ class World:
         Args:
             solid: its index or name, see `index`.
         """
-        return diagnostics.samples(self._simulation.base, self._solids.index("solid", solid))
+        return self._queries.samples(self._solids.index("solid", solid))
 
     def first_touch(self, first: int | str, second: int | str) -> Array:
         """[count] s, when two solids first touched since their state was set; NaN before.
@@ -546,9 +554,9 @@ class World:
             first: index or name of a solid, see `index`.
             second: another.
         """
-        half_pairs = self._solids.pair(first, second)[2]
+        pair = self._solids.pair(first, second)
         self._refresh()
-        return diagnostics.first_touch(self._simulation.state, half_pairs)
+        return self._queries.first_touch(*pair)
 
     def first_touch_position(self, first: int | str, second: int | str) -> Array:
         """[count, 3] m, position of a solid when it first touched another; NaN before.
@@ -557,26 +565,26 @@ class World:
             first: index or name of the solid, see `index`.
             second: another solid, with a larger index.
         """
-        one, other, half_pairs = self._solids.pair(first, second)
+        one, other = self._solids.pair(first, second)
         if one > other:
             raise ValueError(
                 f"first must come before second, whose position isn't stored: got {first!r} and "
                 f"{second!r}"
             )
         self._refresh()
-        return diagnostics.first_touch_position(self._simulation.state, half_pairs)
+        return self._queries.first_touch_position(one, other)
 
     def normal_force(self, first: int | str, second: int | str) -> Array:
         """[count] N, sum of the normal forces between two solids; arguments as `first_touch`."""
-        half_pairs = self._solids.pair(first, second)[2]
+        pair = self._solids.pair(first, second)
         self._refresh()
-        return diagnostics.normal_force(self._simulation.state, half_pairs)
+        return self._queries.normal_force(*pair)
 
     def largest_stable_step(self, world: int = 0) -> float:
         """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         self._refresh()
         simulation, index = self._simulation, self._world_index(world)
-        contacts = stability.of_contacts(simulation.model, self.features, simulation.state, index)
+        contacts = self._queries.largest_stable_step(index)
         fields, _ = field_limits.longest_step(
             self.scene, simulation.model.of_world(index), self.fidelity.integrator
         )
@@ -589,7 +597,7 @@ class World:
     def nbytes(self) -> int:
         """Bytes of state per world, with the model where worlds have their own parameters."""
         own = self._simulation.model.nbytes if self.features.per_world_parameters else 0
-        return (self._simulation.state.nbytes + own) // self.count
+        return (self._simulation.state.nbytes + self._simulation.hidden_nbytes + own) // self.count
 
     def _world_index(self, world: int) -> int:
         index = integer("world", world, low=0)

@@ -1,21 +1,17 @@
-"""Which solid an index or a name means, and the half-pairs through which two of them can touch."""
+"""Which solid an index or a name means."""
 
-import numpy as np
+from collections.abc import Callable
 
-from physics.analysis.diagnostics import between
-from physics.model.tables import Model
 from physics.scene.validation import choice, integer
-
-Array = np.ndarray
 
 
 class Solids:
     """The solids of a scene: bodies, then driven bodies, then statics, each in scene order."""
 
-    def __init__(self, names: tuple[str, ...], model: Model) -> None:
-        """`names`: of the solids; `model`: of the scene."""
-        self._names, self._model = names, model
-        self._between: dict[tuple[int, int], Array] = {}
+    def __init__(self, names: tuple[str, ...], can_touch: Callable[[int, int], bool]) -> None:
+        """`names`: of the solids; `can_touch`: whether two of them can."""
+        self._names, self._can_touch = names, can_touch
+        self._pairs: dict[tuple[int | str, int | str], tuple[int, int]] = {}
 
     def index(self, field: str, value: int | str) -> int:
         """The index of a solid; `field` names the argument in errors.
@@ -34,22 +30,22 @@ class Solids:
             )
         return index
 
-    def pair(self, first: int | str, second: int | str) -> tuple[int, int, Array]:
-        """Indices of two solids that can touch, and the half-pairs [n] between them.
+    def pair(self, first: int | str, second: int | str) -> tuple[int, int]:
+        """Indices of two solids that can touch.
 
         Raises:
             TypeError, ValueError: there is no such solid; the two can't touch.
         """
+        known = self._pairs.get((first, second))
+        if known is not None and type(first) in (int, str) and type(second) in (int, str):
+            return known
         one, other = self.index("first", first), self.index("second", second)
-        half_pairs = self._between.get((one, other))
-        if half_pairs is None:
-            half_pairs = np.flatnonzero(between(self._model, one, other))
-            self._between[one, other] = half_pairs
-        if not len(half_pairs):
+        if not self._can_touch(one, other):
             raise ValueError(
                 f"first and second must be solids that can touch, got {self._names[one]!r} and "
                 f"{self._names[other]!r}: a solid and itself, two statics, a gripper's fingers, "
                 "bodies that a joint connects, and solids whose group and mask exclude each other "
                 "can't"
             )
-        return one, other, half_pairs
+        self._pairs[first, second] = one, other
+        return one, other

@@ -42,7 +42,7 @@ _PARTNERS = 6
 _TURN = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
 
-def _normal(half_pair: Any, dashpot: bool, h: float) -> float:
+def normal_load(half_pair: Any, dashpot: bool, h: float) -> float:
     """A in kg of a half-pair's whole normal stiffness, for a contact that lasts."""
     k, m = float(half_pair["stiffness"]), float(half_pair["pair_mass"])
     damping = float(half_pair["damping"])
@@ -60,7 +60,7 @@ def _normal(half_pair: Any, dashpot: bool, h: float) -> float:
     return 0.5 * (approaching + parting)
 
 
-def _across(half_pair: Any, viscous: bool, h: float) -> float:
+def shear_load(half_pair: Any, viscous: bool, h: float) -> float:
     """A in kg of a half-pair's whole shear stiffness."""
     if half_pair["friction"] == 0.0:
         return 0.0
@@ -68,7 +68,7 @@ def _across(half_pair: Any, viscous: bool, h: float) -> float:
     return h * float(half_pair["shear_damping"]) + spring
 
 
-def _twist(half_pair: Any, h: float) -> float:
+def twist_load(half_pair: Any, h: float) -> float:
     """A in kg m^2 of a half-pair's whole resistance against rolling and spinning."""
     if half_pair["rolling"] == 0.0 and half_pair["spinning"] == 0.0:
         return 0.0
@@ -80,7 +80,7 @@ def _servo(dynamic: Any, h: float) -> float:
     return h * float(dynamic["servo_damping"]) + 0.5 * h * h * float(dynamic["servo_stiffness"])
 
 
-def _root(load: Callable[[float], float]) -> float:
+def root(load: Callable[[float], float]) -> float:
     """Step in s at which a load that grows with the step reaches the limit; inf if it doesn't."""
     if load(_LONGEST) < _FLIP:
         return math.inf
@@ -101,19 +101,19 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
         A = np.zeros_like(inverse)
         for k, (along, across, turn) in contacts.items():
             half_pair = model.half_pair[k]
-            A += _normal(half_pair, features.dashpot, h) * along
-            A += _across(half_pair, features.viscous, h) * across + _twist(half_pair, h) * turn
+            A += normal_load(half_pair, features.dashpot, h) * along
+            A += shear_load(half_pair, features.viscous, h) * across + twist_load(half_pair, h) * turn
         for i, dynamic in enumerate(model.dynamic):
             block = slice(6 * i, 6 * i + 3)
             A[block, block] += _servo(dynamic, h) * np.eye(3)
         return largest_eigenvalue(inverse, A)
 
-    return _root(load)
+    return root(load)
 
 
 def of_servo(dynamic: Any) -> float:
     """Largest stable step in s of a drive that touches nothing."""
-    return _root(lambda h: _servo(dynamic, h) * float(dynamic["inverse_mass"]))
+    return root(lambda h: _servo(dynamic, h) * float(dynamic["inverse_mass"]))
 
 
 def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> tuple[float, int]:
@@ -162,13 +162,13 @@ def _of_dynamic_body(
             fraction = 1.0 / ways[other]
             if other < len(model.dynamic):
                 fraction *= 1.0 + model.dynamic[other]["inverse_mass"] / this["inverse_mass"]
-            normal = fraction * sum(_normal(row, features.dashpot, h) for row in half_pairs)
-            shear = fraction * sum(_across(row, features.viscous, h) for row in half_pairs)
-            twist = fraction * sum(_twist(row, h) for row in half_pairs) * _TURN
+            normal = fraction * sum(normal_load(row, features.dashpot, h) for row in half_pairs)
+            shear = fraction * sum(shear_load(row, features.viscous, h) for row in half_pairs)
+            twist = fraction * sum(twist_load(row, h) for row in half_pairs) * _TURN
             loads = (normal * n + shear * t + twist for n, t in faces)
             each.append(max(largest_eigenvalue(inverse, A) for A in loads))
         if features.impulse:  # its contacts are stable at any step
             each = []
         return float(sum(sorted(each)[-_PARTNERS:]) + _servo(this, h) * this["inverse_mass"])
 
-    return _root(load)
+    return root(load)

@@ -20,7 +20,7 @@ from physics.scene.shapes import PLANE
 
 # fraction of the skin; a list with less than that left is renewed when a collision step starts, in
 # all lanes at once rather than one by one within it
-_RENEWAL = 0.5
+RENEWAL = 0.5
 
 
 @cached_by_features
@@ -109,7 +109,7 @@ def make_broadphase(features):
     def broadphase(model, state, workspace, g, starts_collision_step):
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
-            least = _RENEWAL if starts_collision_step else 0.0
+            least = RENEWAL if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
             exhausted = spend_skin(owner, surface, half_pair, live, least)
             if exhausted > 0:

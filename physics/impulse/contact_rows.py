@@ -164,6 +164,7 @@ def make_contact_rows_of_kind(features, kind):
         )
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
+        first = workspace.half_pair[k].first_row
         points = workspace.contact_row[first : first + slots]
         relative = owner if plane else workspace.relative[0]
         if not plane:

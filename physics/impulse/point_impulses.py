@@ -32,8 +32,8 @@ class Operands(NamedTuple):
 @stage
 def operands_of(model, workspace, k):
     """The operands of half-pair k."""
-    half_pair, slots = model.half_pair[k], workspace.half_pair[k].slots
-    o, s, first = half_pair.owner, half_pair.surface, half_pair.first_slot
+    half_pair, live = model.half_pair[k], workspace.half_pair[k]
+    o, s, first, slots = half_pair.owner, half_pair.surface, live.first_row, live.slots
     return Operands(
         workspace.contact_row[first : first + slots],
         workspace.solid[o : o + 1],
@@ -46,6 +46,21 @@ def operands_of(model, workspace, k):
 
 
 @stage
+def world_tensor(R, i, jx, jy, jz):
+    """R J0^-1 R^T in lane i as xx yy zz xy xz yz, of inverse principal moments."""
+    ax, ay, az = jx * R[0, i], jy * R[1, i], jz * R[2, i]
+    bx, by, bz = jx * R[3, i], jy * R[4, i], jz * R[5, i]
+    return (
+        ax * R[0, i] + ay * R[1, i] + az * R[2, i],
+        bx * R[3, i] + by * R[4, i] + bz * R[5, i],
+        jx * R[6, i] * R[6, i] + jy * R[7, i] * R[7, i] + jz * R[8, i] * R[8, i],
+        ax * R[3, i] + ay * R[4, i] + az * R[5, i],
+        ax * R[6, i] + ay * R[7, i] + az * R[8, i],
+        bx * R[6, i] + by * R[7, i] + bz * R[8, i],
+    )
+
+
+@stage
 def rotate_inertia(model, workspace):
     """Writes the inverse inertia of all bodies in the world frame; that of other solids stays 0."""
     for m in range(model.dynamic.shape[0]):
@@ -53,17 +68,13 @@ def rotate_inertia(model, workspace):
             R, inverse = workspace.solid[m].rotation, workspace.tensor[m].component
             j = model.dynamic[m].inverse_inertia
             for i in range(LANES):
-                jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                ax, ay, az = jx * R[0, i], jy * R[1, i], jz * R[2, i]
-                bx, by, bz = jx * R[3, i], jy * R[4, i], jz * R[5, i]
-                inverse[0, i] = ax * R[0, i] + ay * R[1, i] + az * R[2, i]
-                inverse[1, i] = bx * R[3, i] + by * R[4, i] + bz * R[5, i]
-                inverse[2, i] = (
-                    jx * R[6, i] * R[6, i] + jy * R[7, i] * R[7, i] + jz * R[8, i] * R[8, i]
-                )
-                inverse[3, i] = ax * R[3, i] + ay * R[4, i] + az * R[5, i]
-                inverse[4, i] = ax * R[6, i] + ay * R[7, i] + az * R[8, i]
-                inverse[5, i] = bx * R[6, i] + by * R[7, i] + bz * R[8, i]
+                xx, yy, zz, xy, xz, yz = world_tensor(R, i, at(j[0], i), at(j[1], i), at(j[2], i))
+                inverse[0, i] = xx
+                inverse[1, i] = yy
+                inverse[2, i] = zz
+                inverse[3, i] = xy
+                inverse[4, i] = xz
+                inverse[5, i] = yz
 
 
 @stage

@@ -50,7 +50,7 @@ from physics.scene.validation import IDENTITY
 Array = np.ndarray
 
 
-def _per_world_dtype(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
+def per_world_dtype(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
     """The rows of a lane group: these fields with one entry per lane."""
     assert dtype.names is not None
     assert dtype.fields is not None
@@ -63,15 +63,18 @@ def _per_world_dtype(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
 
 
 def build(
-    scene: Scene, fidelity: Fidelity, per_world_parameters: bool = False
+    scene: Scene,
+    fidelity: Fidelity,
+    per_world_parameters: bool = False,
+    own_spacing: bool = False,
 ) -> tuple[Model, Features]:
     """The model of a scene at a fidelity, and the features that it needs.
 
     The features are those for worlds with `per_world_parameters`, if asked for; the model is that
-    of a single world, see `expand_per_world`.
+    of a single world, see `expand_per_world`. `own_spacing`: see `Layout.of`.
     """
-    layout, own = Layout.of(scene, fidelity), Parameters.of(scene)
-    dynamic = _dynamic_rows(scene)
+    layout, own = Layout.of(scene, fidelity, own_spacing), Parameters.of(scene)
+    dynamic = dynamic_rows(scene)
     half_pairs, samples = _half_pair_rows(layout)
     half_pairs["grid"], grids, nodes = grid_rows(layout)
     parts, hidden = _compound_part_rows(layout)
@@ -103,7 +106,7 @@ def expand_per_world(model: Model, count: int) -> Model:
         (model.half_pair, HALF_PAIR_PER_WORLD),
         (model.compound_part, COMPOUND_PART_PER_WORLD),
     ):
-        table = aligned_zeros((-(-count // LANES), len(rows)), _per_world_dtype(rows.dtype, fields))
+        table = aligned_zeros((-(-count // LANES), len(rows)), per_world_dtype(rows.dtype, fields))
         for name in rows.dtype.names or ():
             table[name] = rows[name][..., None] if name in fields else rows[name]
         tables.append(table)
@@ -123,7 +126,7 @@ def write_per_world(model: Model, layout: Layout, worlds: Array, p: Parameters) 
             table[name][group, ..., lane] = values
 
 
-def _dynamic_rows(scene: Scene) -> Array:
+def dynamic_rows(scene: Scene) -> Array:
     """Rows of DYNAMIC: the columns that don't depend on parameters."""
     rows = np.zeros(len(scene.bodies) + len(scene.driven_bodies), dtype=DYNAMIC)
     rows["is_body"][: len(scene.bodies)] = 1

@@ -91,15 +91,27 @@ class Layout(NamedTuple):
     fidelity: Fidelity
 
     @classmethod
-    def of(cls, scene: Scene, fidelity: Fidelity) -> "Layout":
-        """The layout of a scene."""
+    def of(
+        cls,
+        scene: Scene,
+        fidelity: Fidelity,
+        own_spacing: bool = False,
+        no_half_pairs: bool = False,
+    ) -> "Layout":
+        """The layout of a scene.
+
+        `own_spacing`: each solid's width alone sets the spacing of its samples. `no_half_pairs`:
+        only the solids.
+        """
         solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *scene.statics)
         parts = tuple((i, part) for i, solid in enumerate(solids) for part in _parts(solid))
-        half_pairs = tuple(_half_pairs(scene, fidelity, parts))
+        half_pairs = () if no_half_pairs else tuple(
+            _half_pairs(scene, fidelity, parts, own_spacing)
+        )
         modes = [(1.0, 1.0)] * len(solids)
         leverage = [0.0] * len(solids)
         rolls = np.zeros(len(solids), dtype=bool)
-        for i, body in enumerate(scene.bodies):
+        for i, body in enumerate(() if no_half_pairs else scene.bodies):
             modes[i] = fastest_modes(body.shape, 0.5 * body.shape.width)  # for every fidelity
             leverage[i] = rocking_leverage(_single(body.shape))
             rolls[i] = leverage[i] == 0.0 or isinstance(body.shape, Cylinder | Torus)
@@ -158,7 +170,7 @@ def _parts(solid: Solid) -> tuple[Part, ...]:
 
 
 def _half_pairs(
-    scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...]
+    scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...], own_spacing: bool
 ) -> Iterator[HalfPair]:
     """All half-pairs through which the scene's solids can touch, in a fixed order."""
     solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
@@ -167,8 +179,11 @@ def _half_pairs(
     def rounding(solid: Body | Drive | Static) -> float:
         return fidelity.rounding * solid.shape.width / 2.0
 
+    def apart(shape: Shape) -> float:
+        return fidelity.spacing * shape.width if own_spacing else spacing(shape, scene, fidelity)
+
     def particles(solid: Body | Drive | Static) -> Samples:
-        return solid.shape.particles(spacing(solid.shape, scene, fidelity))
+        return solid.shape.particles(apart(solid.shape))
 
     def sample_sets(
         solid: Body | Drive | Static, other: Solid, least: float = 0.0
@@ -176,7 +191,7 @@ def _half_pairs(
         """Samples that are inset by the rounding, and by at least `least` m if they can be."""
         if fidelity.geometry == "particle" and isinstance(solid, Body):
             return (SampleSet(particles(solid), False),)
-        shape, distance = solid.shape, spacing(solid.shape, scene, fidelity)
+        shape, distance = solid.shape, apart(solid.shape)
         inset = max(rounding(solid), min(least, 0.25 * shape.width))
         if isinstance(shape, Compound):
             return shape.sample_sets(distance, inset)

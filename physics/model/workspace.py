@@ -71,6 +71,7 @@ HALF_PAIR_WORK = np.dtype(
         ("current_closing", "f8", (LANES,)),
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
+        ("first_row", "i8"),  # into Workspace.contact_row; impulse law
         ("untouched", "i8"),  # lanes without contact before this call
     ],
     align=True,
@@ -317,10 +318,12 @@ class Workspace(NamedTuple):
         joints, rows = int(features.joints), model.joint_row
         entries = int((np.arange(len(rows)) - rows["first"]).sum())
         kept = 0 if features.time_control == FIXED else 4
+        work = aligned_zeros(len(half_pair), HALF_PAIR_WORK)
+        work["first_row"] = half_pair["first_slot"]
         return cls(
             solid=aligned_zeros(solids + len(model.compound_part) + joints, SOLID),
             relative=aligned_zeros(2, SOLID),
-            half_pair=aligned_zeros(len(half_pair), HALF_PAIR_WORK),
+            half_pair=work,
             lane=aligned_zeros(1, LANE),
             old=np.zeros(longest, remembered_dtype(features)),
             saved_memory=aligned_zeros(0 if impulse else longest, saved_memory_dtype(features)),

@@ -63,14 +63,16 @@ class Simulation:
         self.bodies = len(scene.bodies)
         self.base: Model
         self.features: Features
-        self.base, self.features = build(scene, fidelity, per_world_parameters)
+        self._per_world = per_world_parameters
+        self.base, self.features = self._build()
         self.model = expand_per_world(self.base, count) if per_world_parameters else self.base
         self._layout = Layout.of(scene, fidelity) if per_world_parameters else None
         self.parameters = Parameters.of(scene, count if per_world_parameters else 1)
         self.state: State = allocate(self.base, self.features, count)
         self.everyone = np.ones(count, dtype=bool)
-        self._find_kernels()
         self._idle: list[Workspace] = []
+        self._allocate()
+        self._find_kernels()
         self._calls_to_sort = 1
         self._fresh = False
         self._table = columns((len(self.base.dynamic), WIDTH), count, float)
@@ -79,6 +81,13 @@ class Simulation:
         self.last_substep, self._last_worlds = math.nan, self.everyone  # of the last call; s
         self._initial = self._initial_rows()
         self.reset(self.everyone)
+
+    def _build(self) -> tuple[Model, Features]:
+        """The model of the scene itself, and what is compiled in."""
+        return build(self.scene, self.fidelity, self._per_world)
+
+    def _allocate(self) -> None:
+        """Arrays beside the state: none."""
 
     def _initial_rows(self) -> Array:
         """The scene's state as rows [dynamic bodies] of DYNAMIC_STATE."""
@@ -128,6 +137,18 @@ class Simulation:
         touch = state.touch[..., : self.count]
         touch[:, NORMAL_FORCE, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
         state.world["overflow"][worlds] = 0
+
+    @property
+    def hidden_nbytes(self) -> int:
+        """Bytes of what the next steps depend on besides `state`."""
+        return 0
+
+    def saved(self) -> Any:
+        """A copy of what the next steps depend on besides `state`: nothing."""
+        return None
+
+    def restore(self, saved: Any) -> None:
+        """Returns to what `saved` gave."""
 
     def changed(self, poses: bool = True) -> None:
         """Marks forces as out of date, and the readout if `poses` have changed too."""
@@ -318,7 +339,7 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, Any]:
         """All attributes but kernels and working arrays, which follow from the features."""
-        left_out = ("_advance", "_readout", "_idle")
+        left_out = ("_advance", "_readout", "_idle", "_load", "_store")
         return {k: v for k, v in self.__dict__.items() if k not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -1,0 +1,144 @@
+"""Kinds of solids and of pairs: what pairs of a scene have in common.
+
+Bodies that agree in shape, mass, material and filter are of one kind. The pairs of two kinds touch
+in the same way, with the same coefficients: those of a scene that has one solid of each. So each
+kind of pair is built once, as a scene of two solids, however many bodies there are.
+"""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics.manybody.tables import PAIR_KIND
+from physics.model.build import build
+from physics.model.features import GENERAL, Features
+from physics.model.tables import Model
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Scene
+from physics.scene.solids import Body, Ground, Static, touch_each_other
+
+Array = np.ndarray
+Solid = Body | Static | Ground
+
+
+class Kinds(NamedTuple):
+    """The kinds of a scene's solids and pairs.
+
+    Attributes:
+        of_solid: [solids] kind of each: of the bodies, then of the statics.
+        pair: [kinds, kinds] row of `pair_kind`; -1 where solids can't touch. Symmetric.
+        pair_kind: of PAIR_KIND.
+        model: tables of all kinds of pairs, one after the other; solids of a pair are rows 0 and 1.
+        features: what any of them needs.
+    """
+
+    of_solid: Array
+    pair: Array
+    pair_kind: Array
+    model: Model
+    features: Features
+
+
+def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
+    """The kinds of a scene of bodies and statics."""
+    solids: list[Solid] = [*scene.bodies, *scene.statics]
+    known: dict[Any, int] = {}
+    of_solid = np.array([known.setdefault(_identity(solid), len(known)) for solid in solids])
+    examples = [solids[int(np.argmax(of_solid == kind))] for kind in range(len(known))]
+    pair = np.full((len(known), len(known)), -1)
+    counts = np.bincount(of_solid)
+    rows: list[tuple[int, ...]] = []
+    built: list[tuple[Model, Features]] = []
+    sizes = np.zeros(3, dtype=int)  # half-pairs, samples, parts so far
+    for i, a in enumerate(examples):
+        if not isinstance(a, Body):
+            break
+        for j in range(i, len(examples)):
+            b = examples[j]
+            if not touch_each_other(a, b) or (i == j and counts[i] < 2):
+                continue
+            model, features = build(_scene_of_two(scene, a, b), fidelity, own_spacing=True)
+            if not len(model.half_pair):
+                continue
+            pair[i, j] = pair[j, i] = len(rows)
+            half_pairs, _, parts = (int(n) for n in sizes)
+            slots = int(model.half_pair["slot_count"].sum())
+            rows.append((half_pairs, len(model.half_pair), slots, parts, len(model.compound_part)))
+            built.append((model, features))
+            sizes += (len(model.half_pair), model.sample.shape[1], len(model.compound_part))
+    if not built:
+        model, features = build(_scene_of_two(scene, examples[0], examples[0]), fidelity)
+        empty = np.zeros(0, PAIR_KIND)
+        return Kinds(of_solid, pair, empty, model._replace(half_pair=model.half_pair[:0]), features)
+    return Kinds(
+        of_solid,
+        pair,
+        np.array(rows, dtype=PAIR_KIND),
+        _joined([model for model, _ in built]),
+        _united([features for _, features in built]),
+    )
+
+
+def _identity(solid: Solid) -> Any:
+    """What solids of one kind have in common."""
+    if isinstance(solid, Ground):
+        return "ground", solid.height, solid.material, solid.group, solid.mask
+    shared = (solid.shape, solid.material, solid.group, solid.mask)
+    return ("body", solid.mass, *shared) if isinstance(solid, Body) else ("static", *shared)
+
+
+def _scene_of_two(scene: Scene, a: Body, b: Solid) -> Scene:
+    """One solid of each kind, at rest."""
+    still = {"linear_velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0), "name": None}
+    one = replace(a, density=None, **still)  # type: ignore[arg-type]
+    if isinstance(b, Body):
+        two = replace(b, density=None, **still)  # type: ignore[arg-type]
+        return Scene(bodies=[one, two], gravity=scene.gravity)
+    return Scene(bodies=[one], statics=[replace(b, name=None)], gravity=scene.gravity)
+
+
+def _joined(models: list[Model]) -> Model:
+    """The tables of several models one after the other, with indices into the joined tables.
+
+    Indices between the half-pairs of a pair, and of their slots, stay those of the pair alone.
+    """
+    samples = points = values = grids = faces = 0
+    tables = []
+    for model in models:
+        half_pair, part = model.half_pair.copy(), model.compound_part.copy()
+        grid = model.grid.copy()
+        half_pair["first_sample"] += samples
+        half_pair["first_partner"] += samples
+        half_pair["grid"] += np.where(half_pair["grid"] >= 0, grids, 0)
+        part["first_hidden_face"] += faces
+        grid["first"] += values
+        grid["first_point"] += values
+        tables.append((half_pair, part, grid))
+        samples += model.sample.shape[1]
+        points += model.surface_point.shape[1]
+        values += len(model.grid_value)
+        grids += len(model.grid)
+        faces += len(model.hidden_face)
+    half_pairs, parts, rows = (np.concatenate(column) for column in zip(*tables, strict=True))
+    first = models[0]
+    dynamic = np.zeros(2, first.dynamic.dtype)  # of a pair: one row for each solid
+    return first._replace(
+        dynamic=dynamic,
+        half_pair=half_pairs,
+        compound_part=parts,
+        hidden_face=np.concatenate([model.hidden_face for model in models]),
+        static=np.zeros((0, 7)),
+        sample=np.ascontiguousarray(np.concatenate([model.sample for model in models], axis=1)),
+        grid=rows,
+        grid_value=np.concatenate([model.grid_value for model in models]),
+    )
+
+
+def _united(all_features: list[Features]) -> Features:
+    """What any of several scenes needs."""
+    values: dict[str, Any] = {}
+    for name in Features._fields:
+        each = [getattr(features, name) for features in all_features]
+        values[name] = max(each)
+    return Features(**{**values, "rotation": GENERAL})

@@ -1,0 +1,234 @@
+"""What can be asked of worlds of many bodies about their contacts."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from physics.analysis import stability
+from physics.analysis.diagnostics import Contacts, samples
+from physics.compiler.jit import LANES, aligned_zeros
+from physics.manybody.reports import TOUCH, ReportArrays, make_touching
+from physics.manybody.simulation import CrowdSimulation
+from physics.model.workspace import CONTACT_ROW
+from physics.rotation import rotation_matrix
+from physics.spring.contact_loop import REPORT
+
+Array = np.ndarray
+
+# steps of the power iteration for the largest frequency, and the change at which it ends
+_MOST_ITERATIONS = 200
+_CONVERGED = 1e-3
+
+
+class CrowdQueries:
+    """Contacts of worlds of many bodies, with states that are up to date."""
+
+    def __init__(self, simulation: CrowdSimulation) -> None:
+        """`simulation`: of the worlds."""
+        self._simulation = simulation
+
+    def _solid(self, places: Array) -> Array:
+        """Indices of solids: bodies, then statics."""
+        simulation = self._simulation
+        beyond = simulation.places_of_bodies - simulation.bodies
+        return np.where(places < simulation.bodies, places, places - beyond)
+
+    def _touching(self, world: int) -> Array:
+        """Rows of TOUCH of a world."""
+        simulation = self._simulation
+        crowd, pairs = simulation.arrays(world)
+        slots = int(simulation.kinds.pair_kind["slot_count"].max(initial=0))
+        if simulation.state.world["diverged"][world]:
+            return np.zeros(0, TOUCH)
+        arrays = ReportArrays(
+            rows=aligned_zeros(slots, REPORT),
+            points=aligned_zeros(slots, CONTACT_ROW),
+            found=np.zeros(8 * simulation.bodies, TOUCH),
+        )
+        state = simulation.state._replace(world=simulation.state.world[world : world + 1])
+        while True:
+            count = make_touching(simulation.features)(
+                simulation.kinds.model, state, simulation.working_memory(), crowd, pairs, arrays
+            )
+            if count <= len(arrays.found):
+                return arrays.found[:count]
+            arrays = arrays._replace(found=np.zeros(count, TOUCH))
+
+    def penetration(self) -> Array:
+        """[count] m, deepest penetration now; 0 where nothing touches."""
+        deepest = [
+            self._touching(world)["penetration"].max(initial=0.0)
+            for world in range(self._simulation.count)
+        ]
+        return np.array(deepest)
+
+    def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
+        """The touching points of one world, whose solids have these names."""
+        found = self._touching(world)
+        pair = np.stack([self._solid(found["owner"]), self._solid(found["surface"])], axis=-1)
+        return Contacts(
+            pair=pair,
+            names=tuple((names[first], names[second]) for first, second in pair),
+            point=found["point"].copy(),
+            normal=found["normal"].copy(),
+            penetration=found["penetration"].copy(),
+            force=found["force"].copy(),
+            first_touch=found["first_touch"].copy(),
+        )
+
+    def samples(self, solid: int) -> tuple[Array, float | Array]:
+        """Points with which a solid touches others, see `World.samples`."""
+        kinds = self._simulation.kinds
+        kind = kinds.of_solid[solid]
+        for other in np.flatnonzero(kinds.pair[kind] >= 0):
+            row = kinds.pair_kind[kinds.pair[kind, other]]
+            first, last = row["first_half_pair"], row["first_half_pair"] + row["half_pair_count"]
+            model = kinds.model._replace(half_pair=kinds.model.half_pair[first:last])
+            points, radius = samples(model, 0 if kind <= other else 1)
+            if len(points):
+                return points, radius
+        return np.zeros((0, 3)), 0.0
+
+    def normal_force(self, first: int, second: int) -> Array:
+        """[count] N between two solids in the last step; 0 where they aren't near each other."""
+        return np.array([
+            sum(float(row["previous_normal_force"][lane]) for row in rows)
+            for rows, lane in self._of_pair(first, second)
+        ])  # fmt: skip
+
+    def first_touch(self, first: int, second: int) -> Array:
+        """[count] s, when two solids first touched since they are near each other; NaN before."""
+        return np.array([
+            float(rows[0]["first_touch"][lane]) if len(rows) else math.nan
+            for rows, lane in self._of_pair(first, second)
+        ])  # fmt: skip
+
+    def first_touch_position(self, first: int, second: int) -> Array:
+        """Not recorded here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(
+            "first_touch_position is not recorded in a world of "
+            f"{self._simulation.bodies} bodies; World.contacts has the points of all contacts"
+        )
+
+    def _of_pair(self, first: int, second: int) -> list[tuple[Any, int]]:
+        """Of each world the half-pairs of a pair, none if the two aren't near, and the lane."""
+        simulation = self._simulation
+        kinds = simulation.kinds
+        one, other = sorted((first, second), key=lambda s: (kinds.of_solid[s], s))
+        beyond = simulation.places_of_bodies - simulation.bodies
+        places = [s if s < simulation.bodies else s + beyond for s in (one, other)]
+        found = []
+        for world in range(simulation.count):
+            home = simulation.home(world, *places)
+            if home < 0:
+                found.append(([], 0))
+                continue
+            pairs = simulation.arrays(world)[1]
+            b, start = home // LANES, pairs.first_work[home // LANES]
+            count = kinds.pair_kind[pairs.kind[b]]["half_pair_count"]
+            found.append((pairs.work[start : start + count], home % LANES))
+        return found
+
+    def can_touch(self, first: int, second: int) -> bool:
+        """Whether two solids are of kinds that can touch."""
+        kinds = self._simulation.kinds
+        return first != second and kinds.pair[kinds.of_solid[first], kinds.of_solid[second]] >= 0
+
+    def largest_stable_step(self, world: int) -> float:
+        """Largest stable step in s with a world's present contacts; inf if nothing limits it.
+
+        By power iteration: the stiffness matrix is a sum over contacts and is never written down.
+        """
+        simulation = self._simulation
+        if simulation.features.impulse:
+            return math.inf
+        found = self._touching(world)
+        if not len(found):
+            return math.inf
+        system = _Contacts(simulation, world, found)
+        x = np.random.default_rng(0).normal(size=(simulation.bodies, 6))
+
+        def load(h: float) -> float:
+            nonlocal x  # a good start for the next step
+            size = 0.0
+            for _ in range(_MOST_ITERATIONS):
+                x = x / np.sqrt(system.product(x, x))
+                y = system.accelerate(h, x)
+                new = system.product(x, y)
+                x = y
+                if abs(new - size) <= _CONVERGED * new:
+                    break
+                size = new
+            return new
+
+        return stability.root(load)
+
+
+class _Contacts:
+    """A world's contacts as a linear system, in displacements and rotations [bodies, 6]."""
+
+    def __init__(self, simulation: CrowdSimulation, world: int, found: Array) -> None:
+        bodies = simulation.bodies
+        dynamic = simulation.state.dynamic[world]
+        self._rows, self._features = found, simulation.features
+        self._half_pair = simulation.kinds.model.half_pair[found["half_pair"]]
+        self._ends = [(found["owner"], 1.0), (found["surface"], -1.0)]
+        self._bodies = bodies
+        self._arm = [
+            found["point"] - dynamic["position"][np.minimum(place, bodies - 1)]
+            for place, _ in self._ends
+        ]
+        base = simulation.base.dynamic
+        turn = rotation_matrix(dynamic["orientation"])
+        self._inverse_mass = base["inverse_mass"][:, None]
+        self._inverse = np.einsum("bij,bj,bkj->bik", turn, base["inverse_inertia"], turn)
+        self._inertia = np.einsum("bij,bj,bkj->bik", turn, base["inertia"], turn)
+
+    def product(self, x: Array, y: Array) -> float:
+        """x M y, with the mass matrix."""
+        moved = np.sum(x[:, :3] * y[:, :3] / self._inverse_mass)
+        return float(moved + np.einsum("bi,bij,bj->", x[:, 3:], self._inertia, y[:, 3:]))
+
+    def accelerate(self, h: float, x: Array) -> Array:
+        """M^-1 A x, see `analysis.stability`."""
+        along, across, twist = (
+            np.array([of(row, flag, h) for row in self._kinds()])[self._index()]
+            for of, flag in (
+                (stability.normal_load, self._features.dashpot),
+                (stability.shear_load, self._features.viscous),
+                (lambda row, _, h: stability.twist_load(row, h), False),
+            )
+        )
+        weight, normal = self._rows["weight"], self._rows["normal"]
+        moved, turned = np.zeros_like(normal), np.zeros_like(normal)
+        for (place, sign), arm in zip(self._ends, self._arm, strict=True):
+            of = np.minimum(place, self._bodies - 1)
+            is_body = (place < self._bodies)[:, None]
+            moved += np.where(is_body, sign * (x[of, :3] + np.cross(x[of, 3:], arm)), 0.0)
+            turned += np.where(is_body, sign * x[of, 3:], 0.0)
+        normal_part = np.sum(moved * normal, axis=1)[:, None] * normal
+        force = weight[:, None] * (
+            along[:, None] * normal_part + across[:, None] * (moved - normal_part)
+        )
+        torque = (weight * twist)[:, None] * turned
+        out = np.zeros_like(x)
+        for (place, sign), arm in zip(self._ends, self._arm, strict=True):
+            own = place < self._bodies
+            np.add.at(out[:, :3], place[own], sign * force[own])
+            np.add.at(out[:, 3:], place[own], sign * (np.cross(arm, force) + torque)[own])
+        out[:, :3] *= self._inverse_mass
+        out[:, 3:] = np.einsum("bij,bj->bi", self._inverse, out[:, 3:])
+        return out
+
+    def _kinds(self) -> Array:
+        """Rows of the half-pairs that occur."""
+        return self._half_pair[np.unique(self._rows["half_pair"], return_index=True)[1]]
+
+    def _index(self) -> Array:
+        """Of each contact, the row of `_kinds`."""
+        return np.unique(self._rows["half_pair"], return_inverse=True)[1]

@@ -1,0 +1,273 @@
+"""Simulation of worlds of many bodies: pairs of bodies side by side in vector lanes, not worlds."""
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from physics.compiler.jit import LANES, aligned_zeros
+from physics.manybody.barrier import new_barrier
+from physics.manybody.impulse_steps import SHARED, make_impulse_steps
+from physics.manybody.kinds import Kinds, find_kinds
+from physics.manybody.pair_lists import PairLists
+from physics.manybody.spring_steps import REFRESH, STEP, make_spring_steps
+from physics.manybody.tables import FRAME_WIDTH, MOST_COLOURS, POSITION, ROTATION, Crowd, Pairs
+from physics.manybody.transfer import make_load_bodies, make_store_bodies
+from physics.model.build import dynamic_rows, per_world_dtype
+from physics.model.coefficients import dynamic_columns
+from physics.model.features import Features
+from physics.model.pairs import Layout
+from physics.model.state import STARTS_ANEW
+from physics.model.tables import DYNAMIC_PER_WORLD, Model
+from physics.model.workspace import CONTACT_ROW, SOLID, Workspace
+from physics.rotation import rotation_matrix
+from physics.scene.fidelity import Fidelity
+from physics.scene.parameters import Parameters
+from physics.scene.scene import Scene
+from physics.scene.solids import Ground
+from physics.scene.validation import IDENTITY
+from physics.step.readout import make_readout
+from physics.step.simulation import Simulation
+
+Array = np.ndarray
+
+# bodies from which a scene's pairs are found by a grid; below, all pairs have rows of their own
+MANY = 33
+# batches of pairs for which a second thread pays
+_FEWEST_BATCHES = 32
+
+_pools: dict[int, ThreadPoolExecutor] = {}
+
+
+def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
+    """Whether a scene is simulated here: many bodies, and nothing that acts on them but contacts."""
+    only_contacts = not (scene.drives or scene.joints or scene.fields or per_world_parameters)
+    fixed = fidelity.time_control == "fixed" and fidelity.integrator in ("midpoint", "euler")
+    return len(scene.bodies) >= MANY and only_contacts and fixed
+
+
+class CrowdSimulation(Simulation):
+    """`count` worlds of many bodies, one after the other; threads share the work of each.
+
+    Attributes:
+        kinds: of solids and pairs.
+    """
+
+    kinds: Kinds
+
+    def _build(self) -> tuple[Model, Features]:
+        """Tables of the bodies; those of pairs are in `kinds`."""
+        scene = self.scene
+        self.kinds = find_kinds(scene, self.fidelity)
+        layout = Layout.of(scene, self.fidelity, no_half_pairs=True)
+        dynamic = dynamic_rows(scene)
+        for name, values in dynamic_columns(layout, Parameters.of(scene)).items():
+            dynamic[name] = values[0]
+        model = self.kinds.model
+        poses = [
+            (0.0, 0.0, s.height, *IDENTITY) if isinstance(s, Ground) else
+            (*s.position, *s.orientation)
+            for s in scene.statics
+        ]  # fmt: skip
+        base = model._replace(
+            dynamic=dynamic,
+            half_pair=model.half_pair[:0],
+            compound_part=model.compound_part[:0],
+            static=np.array(poses, dtype=float).reshape(-1, 7),
+        )
+        return base, self.kinds.features
+
+    def _find_kernels(self) -> None:
+        impulse = self.fidelity.law == "impulse"
+        make: Any = make_impulse_steps if impulse else make_spring_steps
+        self._advance, self._compiled = make(self.features), False
+        self._load, self._store = make_load_bodies(), make_store_bodies()
+        self._readout = make_readout(self.features)
+
+    def _allocate(self) -> None:
+        """The arrays of all worlds, without pairs."""
+        self._rows = aligned_zeros(0, CONTACT_ROW)
+        self._worlds = [[self._empty_world()] for _ in range(self.count)]
+        blocks = len(self._worlds[0][0].solid)
+        self._lists = [
+            PairLists(self.scene, self.fidelity, self.kinds, blocks) for _ in range(self.count)
+        ]
+
+    def _empty_world(self) -> Crowd:
+        """The arrays of a world whose bodies rest at the origin."""
+        bodies, static = self.base.dynamic[: self.bodies], self.base.static
+        blocks = -(-self.bodies // LANES)
+        places = blocks * LANES + len(static)
+        constants = aligned_zeros(blocks, per_world_dtype(bodies.dtype, DYNAMIC_PER_WORLD))
+        padded = np.concatenate([bodies, np.repeat(bodies[:1], blocks * LANES - self.bodies)])
+        padded["weight"][self.bodies :] = 0.0
+        for name in bodies.dtype.names or ():
+            values = padded[name].reshape(blocks, LANES, *padded[name].shape[1:])
+            if name in DYNAMIC_PER_WORLD:
+                constants[name] = np.moveaxis(values, 1, -1)
+            else:
+                constants[name] = values[:, 0]
+        solid = aligned_zeros(blocks, SOLID)
+        solid["orientation"][:, 3] = 1.0
+        solid["weight"] = constants["weight"]
+        frame = np.zeros((places, FRAME_WIDTH))
+        frame[blocks * LANES :, POSITION : POSITION + 3] = static[:, :3]
+        frame[blocks * LANES :, ROTATION : ROTATION + 9] = rotation_matrix(static[:, 3:]).reshape(
+            -1, 9
+        )
+        return Crowd(
+            constants=constants,
+            solid=solid,
+            frame=frame,
+            tensor=np.zeros((places, 8)),
+            margin=np.zeros((blocks, LANES)),
+            motion=np.zeros((blocks, LANES)),
+            wrench=np.zeros((0, 6)),
+            incident_first=np.zeros(blocks * LANES + 1, np.int64),
+            incident=np.zeros(0, np.int64),
+            order=np.zeros(0, np.int64),
+            colour_first=np.zeros(MOST_COLOURS + 2, np.int64),
+            pair_kind=self.kinds.pair_kind,
+            stirred=np.zeros(blocks * LANES, np.int64),
+        )  # fmt: skip
+
+    def _run(self, h: float, substeps: int, worlds: Array) -> bool:
+        """Advances the worlds of a mask; returns whether all went well."""
+        self.last_substep, self._last_worlds = h, worlds
+        self._table_valid = False
+        well = True
+        for w in np.flatnonzero(worlds):
+            well = self._run_world(int(w), h, substeps) and well
+        self._fresh = self._fresh or (well and bool(worlds.all()) and substeps > 0)
+        return well
+
+    def _run_world(self, w: int, h: float, substeps: int) -> bool:
+        """Advances one world; returns whether it went well."""
+        status, lists = self.state.world[w : w + 1], self._lists[w]
+        if status["diverged"][0]:
+            return False
+        crowd = self._worlds[w][0]
+        if self.features.wrench:
+            wrench = np.zeros((crowd.motion.size, 6))
+            wrench[: self.bodies] = self.state.wrench[w]
+            crowd = crowd._replace(wrench=wrench)
+        self._load(self.state.dynamic, w, crowd)
+        refresh = int(status["needs_refresh"][0])
+        progress = np.zeros(8 + self.threads, np.int64)
+        crowd.stirred[...] = 0
+        progress[1] = REFRESH if refresh else STEP
+        if refresh == STARTS_ANEW:
+            lists.clear()
+            crowd = self._search(w, crowd, at_rest=True)
+        finite = True
+        while True:
+            self._call(crowd, lists, w, h, substeps, progress)
+            if progress[2] == 0:
+                break
+            if progress[2] == 2:
+                needed = int(progress[3])
+                self._rows = aligned_zeros(needed + needed // 4, CONTACT_ROW)
+                continue
+            finite = bool(np.isfinite(crowd.frame).all())
+            if not finite:
+                break
+            crowd = self._search(w, crowd, at_rest=False)
+        done = int(progress[0])
+        diverged = self._store(self.state.dynamic, w, crowd, self.bodies)
+        status["time"] += done * h
+        status["needs_refresh"] = 0
+        status["diverged"] = diverged
+        self._worlds[w][0] = crowd
+        return diverged == 0
+
+    def _search(self, w: int, crowd: Crowd, at_rest: bool) -> Crowd:
+        """The world with its near pairs found again."""
+        if at_rest:
+            self._place(crowd)
+        return self._lists[w].search(crowd)
+
+    @staticmethod
+    def _place(crowd: Crowd) -> None:
+        """Writes the poses of bodies whose state was set from outside."""
+        solid, places = crowd.solid, crowd.motion.size
+        position = np.moveaxis(solid["position"], -1, 1).reshape(places, 3)
+        orientation = np.moveaxis(solid["orientation"], -1, 1).reshape(places, 4)
+        crowd.frame[:places] = 0.0
+        crowd.frame[:places, POSITION : POSITION + 3] = position
+        rotations = rotation_matrix(orientation).reshape(places, 9)
+        crowd.frame[:places, ROTATION : ROTATION + 9] = rotations
+
+    def _call(
+        self, crowd: Crowd, lists: PairLists, w: int, h: float, substeps: int, progress: Array
+    ) -> None:
+        """Runs the kernel on as many threads as pay."""
+        threads = self.threads if len(crowd.order) >= _FEWEST_BATCHES else 1
+        while len(self._idle) < threads:
+            self._idle.append(self.working_memory())
+        state = self.state._replace(world=self.state.world[w : w + 1])
+        barrier = new_barrier()
+
+        impulse = self.fidelity.law == "impulse"
+        shared = np.zeros((threads, SHARED))
+
+        def run(thread: int, threads: int, substeps: int, progress: Array) -> Any:
+            return self._advance(
+                self.kinds.model, state, self._idle[thread], *([self._rows] if impulse else []),
+                crowd, lists.pairs, h, substeps, self.fidelity.collision_substeps, progress,
+                barrier, *([shared] if impulse else []), thread, threads,
+            )  # fmt: skip
+
+        if not self._compiled:  # by one thread, without a step: the others can't wait for it
+            run(0, 1, 0, np.zeros_like(progress))
+            self._compiled = True
+        if threads > 1 and threads not in _pools:
+            _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="bodies")
+        arguments = threads, substeps, progress
+        others = [_pools[threads].submit(run, n, *arguments) for n in range(1, threads)]
+        run(0, *arguments)
+        for other in others:
+            other.result()
+
+    @property
+    def hidden_nbytes(self) -> int:
+        """Bytes of bodies in blocks and of pairs."""
+        return sum(
+            array.nbytes for one, lists in zip(self._worlds, self._lists, strict=True)
+            for array in (*one[0], *lists.pairs)
+        )  # fmt: skip
+
+    def saved(self) -> Any:
+        """A copy of the pairs, and of how far bodies have moved since they were found."""
+        return [
+            (one[0].motion.copy(), one[0].margin.copy(), lists.saved())
+            for one, lists in zip(self._worlds, self._lists, strict=True)
+        ]
+
+    def restore(self, saved: Any) -> None:
+        """Returns to what `saved` gave."""
+        for one, lists, (motion, margin, pairs) in zip(
+            self._worlds, self._lists, saved, strict=True
+        ):
+            lists.restore(pairs)
+            one[0] = lists.listed(one[0], margin)
+            one[0].motion[...] = motion
+
+    def arrays(self, world: int) -> tuple[Crowd, Pairs]:
+        """The arrays of a world."""
+        return self._worlds[world][0], self._lists[world].pairs
+
+    def home(self, world: int, first: int, second: int) -> int:
+        """Home of the pair of two places, -1 if they aren't near each other."""
+        return self._lists[world].home(first, second)
+
+    @property
+    def places_of_bodies(self) -> int:
+        """Number of places before those of statics."""
+        return int(self._worlds[0][0].motion.size)
+
+    def working_memory(self) -> Workspace:
+        """Of one thread, for any kind of pair."""
+        kinds = self.kinds
+        whole = Workspace.of(kinds.model, self.features)
+        parts = int(kinds.pair_kind["part_count"].max(initial=0))
+        return whole._replace(solid=aligned_zeros(2 + parts, SOLID))

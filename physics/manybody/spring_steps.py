@@ -1,0 +1,96 @@
+"""Substeps of one world of many bodies with the spring law, by several threads.
+
+Each thread works on its part of the blocks and of the batches, and all wait for each other between
+the two. Every batch writes its own wrenches, and every body adds up those of its pairs in a fixed
+order, so the result does not depend on the number of threads.
+"""
+
+from functools import cache
+
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import large_entry
+from physics.integrators.kick import make_kick
+from physics.manybody.barrier import wait
+from physics.manybody.batches import make_batch_forces
+from physics.manybody.blocks import (
+    add_contacts,
+    block_model,
+    block_workspace,
+    known_forces,
+    make_move_block,
+    make_place_block,
+)
+from physics.model.features import EULER, Features
+
+# what a call continues with, see `make_spring_steps`
+STEP, RESUME, REFRESH = range(3)
+# consecutive batches that one thread takes
+BATCHES = 4
+
+
+@cache
+def make_spring_steps(features: Features):
+    """Entry point: substeps until all are done or pairs have to be searched again."""
+    sources = SOURCES
+    move_block, place_block = make_move_block(features), make_place_block(features)
+    batch_forces, kick = make_batch_forces(features), make_kick(features)
+    before = 1.0 if features.integrator == EULER else 0.5
+
+    @large_entry
+    def spring_steps(
+        model, state, workspace, crowd, pairs, h, substeps, collision_substeps, progress, barrier,
+        thread, threads,
+    ):  # fmt: skip
+        """All threads call it with the same arguments but their workspace and `thread`.
+
+        progress: [8 + threads] substeps done; STEP, RESUME after pairs have been searched, or
+        REFRESH, which computes forces only; 1: pairs have to be searched; and, from 8 on, how many
+        bodies of each thread have left their margin.
+        """
+        _ = sources
+        blocks, batches = crowd.solid.shape[0], crowd.order.shape[0]
+        first, last = thread * blocks // threads, (thread + 1) * blocks // threads
+        done, phase = progress[0], progress[1]
+        wait(barrier, threads)  # before any thread writes the progress
+        while done < substeps or phase != STEP:
+            if phase == STEP:
+                far = 0
+                for m in range(first, last):
+                    far += move_block(model, workspace, crowd, m, before * h, h)
+                progress[8 + thread] = far
+                wait(barrier, threads)
+                far = 0
+                for t in range(threads):
+                    far += progress[8 + t]
+                if far > 0:
+                    wait(barrier, threads)
+                    if thread == 0:
+                        progress[0], progress[1], progress[2] = done, RESUME, 1
+                    return
+            elif phase == REFRESH:
+                for m in range(first, last):
+                    place_block(model, workspace, crowd, m)
+                wait(barrier, threads)
+            step = 0.0 if phase == REFRESH else h
+            elapsed = done * h + step
+            starts = phase != REFRESH and done > 0 and done % collision_substeps == 0
+            for n in range(batches):
+                if n // BATCHES % threads == thread:
+                    b = crowd.order[n]
+                    batch_forces(
+                        model, state, workspace, crowd, pairs, b, step, elapsed, starts
+                    )
+            wait(barrier, threads)
+            for m in range(first, last):
+                known_forces(model, workspace, crowd, m)
+                add_contacts(crowd, pairs, m, crowd.solid[m].force, crowd.solid[m].torque)
+                if phase != REFRESH and before < 1.0:
+                    own = block_model(model, crowd, m)
+                    kick(own, block_workspace(workspace, crowd, m), 0.5 * h)
+            done += 0 if phase == REFRESH else 1
+            phase = STEP
+        wait(barrier, threads)
+        if thread == 0:
+            progress[0], progress[1], progress[2] = done, STEP, 0
+
+    return spring_steps

@@ -1,0 +1,159 @@
+"""Arrays of one world of many bodies.
+
+A *place* is a row of `Crowd.frame`: bodies come first, in blocks of LANES, then the statics. A
+*pair batch* holds LANES pairs of solids of the same kind side by side; its half-pairs are those of
+a scene of two solids, so the stages of a lane group work on it unchanged.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics.compiler.jit import LANES, aligned_zeros
+from physics.model.features import Features
+from physics.model.state import candidate_dtype
+from physics.model.tables import Model
+from physics.model.workspace import CONTACT_ROW, HALF_PAIR_WORK, SOLID
+
+Array = np.ndarray
+
+# one row per kind of pair: of two kinds of solids that can touch
+PAIR_KIND = np.dtype(
+    [
+        ("first_half_pair", "i8"),  # into Model.half_pair
+        ("half_pair_count", "i8"),
+        ("slot_count", "i8"),  # of all its half-pairs
+        ("first_part", "i8"),  # into Model.compound_part
+        ("part_count", "i8"),
+    ],
+    align=True,
+)
+
+# columns of Crowd.frame
+POSITION, ROTATION, VELOCITY, ANGULAR_VELOCITY = 0, 3, 12, 15
+DISPLACEMENT, ROTATION_BOUND, FRAME_WIDTH = 18, 21, 24
+
+# largest number of colours; pairs that find none free are solved one after the other
+MOST_COLOURS = 63
+
+
+class Pairs(NamedTuple):
+    """The pairs of solids that are near each other, by their batch and lane.
+
+    Attributes:
+        kind: [batches] row of PAIR_KIND.
+        colour: [batches]; pairs of the same colour share no body. Impulse law; else 0.
+        first: [batches, LANES] place of a pair's first solid, -1 in a free lane.
+        second: likewise.
+        first_slot: [batches] into `candidate`.
+        first_work: [batches] into `work`.
+        candidate: [1, slots] of candidate_dtype.
+        sample_id: [1, slots, LANES] of each candidate.
+        work: [half-pairs of all batches] of HALF_PAIR_WORK.
+        wrench: [batches, LANES, 12] N and N m: force and torque on the first solid, then on the
+            second, about their centres.
+        busy: [batches] 1: some lists aren't empty.
+        first_row: [batches] into the contact rows; impulse law, as all below.
+        row_count: [batches].
+        colliding: [batches, LANES] 1: a pair collides in this substep.
+        impact_work: [batches, LANES] J, of its impact impulses.
+    """
+
+    kind: Array
+    colour: Array
+    first: Array
+    second: Array
+    first_slot: Array
+    first_work: Array
+    candidate: Array
+    sample_id: Array
+    work: Array
+    wrench: Array
+    busy: Array
+    first_row: Array
+    row_count: Array
+    colliding: Array
+    impact_work: Array
+
+
+class Crowd(NamedTuple):
+    """One world of many bodies.
+
+    Attributes:
+        constants: [blocks] of DYNAMIC, a value per lane: LANES bodies side by side.
+        solid: [blocks] of SOLID.
+        frame: [places, FRAME_WIDTH] of each solid side by side: position, rotation matrix,
+            velocity, angular velocity, and displacement and rotation bound of the last drift.
+        tensor: [places, 8] inverse inertia in the world frame: xx yy zz xy xz yz; impulse law.
+        margin: [blocks, LANES] m that a body may move before pairs are searched again.
+        motion: [blocks, LANES] m that it has moved since, at most.
+        wrench: [blocks * LANES, 6] N and N m from the user.
+        incident_first: [blocks * LANES + 1] into `incident`.
+        incident: of each body's pairs twice the home, plus 1 where it is the second solid; a home
+            is the batch times LANES plus the lane.
+        order: [batches] in use, by colour.
+        colour_first: [MOST_COLOURS + 2] into `order`.
+        pair_kind: [kinds] of PAIR_KIND.
+        stirred: [blocks * LANES] when an impact last changed a body's velocity; impulse law.
+    """
+
+    constants: Array
+    solid: Array
+    frame: Array
+    tensor: Array
+    margin: Array
+    motion: Array
+    wrench: Array
+    incident_first: Array
+    incident: Array
+    order: Array
+    colour_first: Array
+    pair_kind: Array
+    stirred: Array
+
+
+def no_pairs(features: Features) -> Pairs:
+    """Without any pair."""
+    return Pairs(
+        kind=np.zeros(0, np.int64),
+        colour=np.zeros(0, np.int64),
+        first=np.zeros((0, LANES), np.int64),
+        second=np.zeros((0, LANES), np.int64),
+        first_slot=np.zeros(0, np.int64),
+        first_work=np.zeros(0, np.int64),
+        candidate=aligned_zeros((1, 0), candidate_dtype(features)),
+        sample_id=np.zeros((1, 0, LANES), np.int32),
+        work=aligned_zeros(0, HALF_PAIR_WORK),
+        wrench=np.zeros((0, LANES, 12)),
+        busy=np.zeros(0, np.int64),
+        first_row=np.zeros(0, np.int64),
+        row_count=np.zeros(0, np.int64),
+        colliding=np.zeros((0, LANES), np.int64),
+        impact_work=np.zeros((0, LANES)),
+    )
+
+
+def with_room(pairs: Pairs, features: Features, batches: int, slots: int, work: int) -> Pairs:
+    """The same pairs in arrays with room for more, of which the new part is zero."""
+    sizes = {"candidate": slots, "sample_id": slots, "work": work}
+
+    def larger(name: str, array: Array) -> Array:
+        axis = 1 if name in ("candidate", "sample_id") else 0
+        shape = list(array.shape)
+        shape[axis] = sizes.get(name, batches)
+        if array.dtype.names:
+            room: Any = aligned_zeros(tuple(shape), array.dtype)
+        else:
+            room = np.zeros(shape, array.dtype)
+        room[(slice(None),) * axis + (slice(array.shape[axis]),)] = array
+        return room
+
+    return Pairs(*(larger(name, array) for name, array in zip(pairs._fields, pairs, strict=True)))
+
+
+def copy_pairs(pairs: Pairs) -> Pairs:
+    """A deep copy."""
+    return Pairs(*(array.copy() for array in pairs))
+
+
+__all__ = ["CONTACT_ROW", "Crowd", "Model", "PAIR_KIND", "Pairs", "SOLID"]

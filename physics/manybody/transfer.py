@@ -1,0 +1,59 @@
+"""Between the state that users see, body by body, and blocks of bodies."""
+
+from functools import cache
+
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import LANES, entry
+from physics.step.time_layers import LARGEST
+
+
+@cache
+def make_load_bodies():
+    """Entry point that loads the bodies of world w into their blocks."""
+    sources = SOURCES
+
+    @entry
+    def load_bodies(dynamic, w, crowd):
+        _ = sources
+        for body in range(dynamic.shape[1]):
+            row, solid, i = dynamic[w, body], crowd.solid[body // LANES], body % LANES
+            for c in range(3):
+                solid.position[c, i] = row.position[c]
+                solid.momentum[c, i] = row.momentum[c]
+                solid.angular_momentum[c, i] = row.angular_momentum[c]
+                solid.force[c, i] = row.force[c]
+                solid.torque[c, i] = row.torque[c]
+            for c in range(4):
+                solid.orientation[c, i] = row.orientation[c]
+
+    return load_bodies
+
+
+@cache
+def make_store_bodies():
+    """Entry point that stores the bodies of world w, with quaternions of w >= 0."""
+    sources = SOURCES
+
+    @entry
+    def store_bodies(dynamic, w, crowd, bodies):
+        """Returns the index plus 1 of the first body that isn't finite; 0 if all are."""
+        _ = sources
+        diverged = 0
+        for body in range(bodies):
+            row, solid, i = dynamic[w, body], crowd.solid[body // LANES], body % LANES
+            total = 0.0
+            for c in range(3):
+                row.position[c] = solid.position[c, i]
+                row.momentum[c] = solid.momentum[c, i]
+                row.angular_momentum[c] = solid.angular_momentum[c, i]
+                row.force[c] = solid.force[c, i]
+                row.torque[c] = solid.torque[c, i]
+                total += abs(row.position[c]) + abs(row.momentum[c]) + abs(row.angular_momentum[c])
+            sign = -1.0 if solid.orientation[3, i] < 0.0 else 1.0
+            for c in range(4):
+                row.orientation[c] = sign * solid.orientation[c, i]
+            if diverged == 0 and not total < LARGEST:
+                diverged = body + 1
+        return diverged
+
+    return store_bodies
