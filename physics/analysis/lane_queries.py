@@ -61,6 +61,4 @@ class LaneQueries:
     def largest_stable_step(self, world: int) -> float:
         """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         simulation = self._simulation
-        return stability.of_contacts(
-            simulation.model, simulation.features, simulation.state, world
-        )
+        return stability.of_contacts(simulation.model, simulation.features, simulation.state, world)

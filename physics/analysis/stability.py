@@ -102,7 +102,10 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
         for k, (along, across, turn) in contacts.items():
             half_pair = model.half_pair[k]
             A += normal_load(half_pair, features.dashpot, h) * along
-            A += shear_load(half_pair, features.viscous, h) * across + twist_load(half_pair, h) * turn
+            A += (
+                shear_load(half_pair, features.viscous, h) * across
+                + twist_load(half_pair, h) * turn
+            )
         for i, dynamic in enumerate(model.dynamic):
             block = slice(6 * i, 6 * i + 3)
             A[block, block] += _servo(dynamic, h) * np.eye(3)

@@ -7,6 +7,7 @@ it waits for.
 """
 
 import os
+from typing import Any
 
 import numpy as np
 from numba.core import cgutils, types
@@ -27,8 +28,7 @@ _give_core_away = types.ExternalFunction(
 )
 
 
-@intrinsic
-def _add(typingctx, array, index, value):
+def _add_at(typingctx, array, index, value):
     """Atomically adds to array[index] and returns what was there."""
 
     def codegen(context, builder, signature, arguments):
@@ -40,6 +40,9 @@ def _add(typingctx, array, index, value):
         return builder.atomic_rmw("add", pointer, arguments[2], "seq_cst")
 
     return types.int64(array, types.int64, types.int64), codegen
+
+
+_add: Any = intrinsic(_add_at)
 
 
 def new_barrier() -> Array:

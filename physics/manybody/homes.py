@@ -155,7 +155,7 @@ def make_settle(features: Features):
 
     @entry
     def settle(pairs, pair_kind, free, kind, pair, bodies, places, new, homes, start):
-        """Continues with pair `start`; returns where it had no more room, or the number of pairs."""
+        """Continues with pair `start`; returns where room ran out, or the number of pairs."""
         _ = sources
         for n in range(start, new.shape[0]):
             if homes[n] >= 0:

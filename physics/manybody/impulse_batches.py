@@ -338,7 +338,7 @@ def make_warm_batch(features):
 
 @cached_by_features
 def make_finish_batch(features):
-    """Sequence that turns the impulses of a batch into forces, and stores what contacts remember."""
+    """Sequence that turns impulses of a batch into forces, and stores what contacts remember."""
     store_forces = make_store_forces(features)
 
     @sequence

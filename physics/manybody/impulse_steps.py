@@ -185,37 +185,35 @@ def make_collide(features):
         model, workspace, rows, crowd, pairs, h, refresh, barrier, thread, threads, shared, stamp
     ):
         """Returns the last stamp, and whether anything has collided."""
-        stamp += 1
-        if find(
-            model, workspace, rows, crowd, pairs, h, barrier, thread, threads, shared, stamp
-        ) == 0.0:  # fmt: skip
-            return stamp, False
-        push_out(model, workspace, rows, crowd, pairs, stamp, barrier, thread, threads)
-        stamp += 1
-        if find(
-            model, workspace, rows, crowd, pairs, h, barrier, thread, threads, shared, stamp
-        ) == 0.0:  # fmt: skip
-            return stamp, False
+        # each stage is called in one place: two calls would be compiled twice
+        for attempt in range(2):
+            stamp += 1
+            found = find(
+                model, workspace, rows, crowd, pairs, h, barrier, thread, threads, shared, stamp
+            )
+            if found == 0.0:
+                return stamp, False
+            if attempt == 0:
+                push_out(model, workspace, rows, crowd, pairs, stamp, barrier, thread, threads)
         fastest, e = largest(shared, threads, 0), largest(shared, threads, 1)
         wait(barrier, threads)
-        stamp = solve(
-            model, workspace, rows, crowd, pairs, fastest, False, barrier, thread, threads, shared,
-            stamp,
-        )  # fmt: skip
-        allowed = e * e * max(-all_work(crowd, pairs, barrier, thread, threads, shared), 0.0)
-        stamp += 1
-        restitute(
-            model, workspace, rows, crowd, pairs, False, 1.0, barrier, thread, threads, stamp
-        )
-        gained = all_work(crowd, pairs, barrier, thread, threads, shared)
-        scale = math.sqrt(allowed / gained) if gained > allowed else 1.0
-        restitute(
-            model, workspace, rows, crowd, pairs, True, scale, barrier, thread, threads, stamp
-        )
-        stamp = solve(
-            model, workspace, rows, crowd, pairs, fastest, True, barrier, thread, threads, shared,
-            stamp,
-        )  # fmt: skip
+        for after in range(2):
+            stamp = solve(
+                model, workspace, rows, crowd, pairs, fastest, after == 1, barrier, thread,
+                threads, shared, stamp,
+            )  # fmt: skip
+            if after == 1:
+                break
+            work = all_work(crowd, pairs, barrier, thread, threads, shared)
+            allowed, scale = e * e * max(-work, 0.0), 1.0
+            stamp += 1
+            for rescale in range(2):
+                restitute(
+                    model, workspace, rows, crowd, pairs, rescale == 1, scale, barrier, thread,
+                    threads, stamp,
+                )  # fmt: skip
+                gained = all_work(crowd, pairs, barrier, thread, threads, shared)
+                scale = math.sqrt(allowed / gained) if gained > allowed else 1.0
         for n in range(crowd.order.shape[0]):
             b = crowd.order[n]
             if n // BATCHES % threads == thread and pairs.busy[b] != 0:
@@ -326,9 +324,7 @@ def make_impulse_steps(features: Features):
             if phase != ROWS:
                 for n in range(batches):
                     if n // BATCHES % threads == thread:
-                        list_contacts(
-                            model, state, workspace, crowd, pairs, crowd.order[n], starts
-                        )
+                        list_contacts(model, state, workspace, crowd, pairs, crowd.order[n], starts)
             for m in range(first, last):
                 write_tensors(crowd, m)
                 known_forces(model, workspace, crowd, m)
@@ -361,20 +357,19 @@ def make_impulse_steps(features: Features):
                     add_contacts(crowd, pairs, m, solid.momentum, solid.angular_momentum)
                 change_velocities(crowd, m, -lag * drifted)
             wait(barrier, threads)
-            sweep_all(
-                model, workspace, rows, crowd, pairs, span, False, barrier, thread, threads
-            )
-            for m in range(first, last):
-                change_velocities(crowd, m, span)
-            wait(barrier, threads)
-            warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads)
-            sweep_all(model, workspace, rows, crowd, pairs, span, True, barrier, thread, threads)
+            for soft in range(2):
+                if soft == 1:
+                    for m in range(first, last):
+                        change_velocities(crowd, m, span)
+                    wait(barrier, threads)
+                    warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads)
+                sweep_all(
+                    model, workspace, rows, crowd, pairs, span, soft == 1, barrier, thread, threads
+                )
             for n in range(batches):
                 b = crowd.order[n]
                 if n // BATCHES % threads == thread and pairs.busy[b] != 0:
-                    finish_batch(
-                        model, state, workspace, rows, crowd, pairs, b, span, elapsed
-                    )
+                    finish_batch(model, state, workspace, rows, crowd, pairs, b, span, elapsed)
             wait(barrier, threads)
             for m in range(first, last):
                 solid = crowd.solid[m]

@@ -68,7 +68,8 @@ def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
             built.append((model, features))
             sizes += (len(model.half_pair), model.sample.shape[1], len(model.compound_part))
     if not built:
-        model, features = build(_scene_of_two(scene, examples[0], examples[0]), fidelity)
+        body = scene.bodies[0]
+        model, features = build(_scene_of_two(scene, body, body), fidelity)
         empty = np.zeros(0, PAIR_KIND)
         return Kinds(of_solid, pair, empty, model._replace(half_pair=model.half_pair[:0]), features)
     return Kinds(

@@ -9,6 +9,7 @@ from physics.manybody.extents import half_extents
 from physics.manybody.homes import Homes, make_incidence, make_merge, make_settle, no_homes
 from physics.manybody.kinds import Kinds
 from physics.manybody.near_pairs import Grid, grid_levels, make_near_pairs
+from physics.manybody.repack import make_occupancy, make_repack, room_for
 from physics.manybody.sorting import lexicographic_order, make_sort_pairs
 from physics.manybody.tables import (
     DISPLACEMENT,
@@ -20,7 +21,6 @@ from physics.manybody.tables import (
     no_pairs,
     with_room,
 )
-from physics.manybody.repack import make_occupancy, make_repack, room_for
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Ground

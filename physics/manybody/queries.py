@@ -122,7 +122,7 @@ class CrowdQueries:
         one, other = sorted((first, second), key=lambda s: (kinds.of_solid[s], s))
         beyond = simulation.places_of_bodies - simulation.bodies
         places = [s if s < simulation.bodies else s + beyond for s in (one, other)]
-        found = []
+        found: list[tuple[Any, int]] = []
         for world in range(simulation.count):
             home = simulation.home(world, *places)
             if home < 0:
@@ -190,7 +190,7 @@ class _Contacts:
         self._inertia = np.einsum("bij,bj,bkj->bik", turn, base["inertia"], turn)
 
     def product(self, x: Array, y: Array) -> float:
-        """x M y, with the mass matrix."""
+        """The product x M y with the mass matrix M."""
         moved = np.sum(x[:, :3] * y[:, :3] / self._inverse_mass)
         return float(moved + np.einsum("bi,bij,bj->", x[:, 3:], self._inertia, y[:, 3:]))
 

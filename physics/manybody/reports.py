@@ -66,7 +66,7 @@ def make_touching(features: Features) -> Any:
 
     @stage
     def write(found, frame, rotation, origin, i, x, y, z, nx, ny, nz, fx, fy, fz):
-        """Writes vectors of a frame in the world frame; `rotation` None: that they are in already."""
+        """Writes vectors in the world frame; `frame`: they are in one with this rotation."""
         if frame:
             x, y, z = rotated(rotation, i, x, y, z)
             nx, ny, nz = rotated(rotation, i, nx, ny, nz)

@@ -40,7 +40,7 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 
 
 def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
-    """Whether a scene is simulated here: many bodies, and nothing that acts on them but contacts."""
+    """Whether a scene is simulated here: many bodies, on which contacts and gravity alone act."""
     only_contacts = not (scene.drives or scene.joints or scene.fields or per_world_parameters)
     fixed = fidelity.time_control == "fixed" and fidelity.integrator in ("midpoint", "euler")
     return len(scene.bodies) >= MANY and only_contacts and fixed

@@ -77,9 +77,7 @@ def make_spring_steps(features: Features):
             for n in range(batches):
                 if n // BATCHES % threads == thread:
                     b = crowd.order[n]
-                    batch_forces(
-                        model, state, workspace, crowd, pairs, b, step, elapsed, starts
-                    )
+                    batch_forces(model, state, workspace, crowd, pairs, b, step, elapsed, starts)
             wait(barrier, threads)
             for m in range(first, last):
                 known_forces(model, workspace, crowd, m)

@@ -12,8 +12,7 @@ import numpy as np
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.features import Features
 from physics.model.state import candidate_dtype
-from physics.model.tables import Model
-from physics.model.workspace import CONTACT_ROW, HALF_PAIR_WORK, SOLID
+from physics.model.workspace import HALF_PAIR_WORK
 
 Array = np.ndarray
 
@@ -154,6 +153,3 @@ def with_room(pairs: Pairs, features: Features, batches: int, slots: int, work: 
 def copy_pairs(pairs: Pairs) -> Pairs:
     """A deep copy."""
     return Pairs(*(array.copy() for array in pairs))
-
-
-__all__ = ["CONTACT_ROW", "Crowd", "Model", "PAIR_KIND", "Pairs", "SOLID"]

@@ -105,8 +105,8 @@ class Layout(NamedTuple):
         """
         solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *scene.statics)
         parts = tuple((i, part) for i, solid in enumerate(solids) for part in _parts(solid))
-        half_pairs = () if no_half_pairs else tuple(
-            _half_pairs(scene, fidelity, parts, own_spacing)
+        half_pairs = (
+            () if no_half_pairs else tuple(_half_pairs(scene, fidelity, parts, own_spacing))
         )
         modes = [(1.0, 1.0)] * len(solids)
         leverage = [0.0] * len(solids)

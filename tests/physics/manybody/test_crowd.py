@@ -1,0 +1,193 @@
+"""Worlds of many bodies behave as those of few, and don't depend on the number of threads."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from physics import Body, Box, Fidelity, Ground, Scene, SimulationDiverged, World
+from physics.analysis.lane_queries import LaneQueries
+from physics.manybody import simulation as many
+from physics.step.simulation import Simulation
+from tests.physics.manybody.scenes import HALF, heap, wall
+
+CUBE = Box((HALF, HALF, HALF))
+
+
+@pytest.fixture(autouse=True)
+def _threads_for_few_pairs(monkeypatch):
+    monkeypatch.setattr(many, "_FEWEST_BATCHES", 2)
+
+
+def state_of(world):
+    dynamic = world._simulation.state.dynamic
+    return b"".join(
+        dynamic[name].tobytes()
+        for name in ("position", "orientation", "momentum", "angular_momentum")
+    )
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_a_heap_is_that_of_all_pairs_and_bitwise_the_same_for_1_2_and_4_threads(law):
+    fidelity = World(Scene([Body(CUBE)]), law).fidelity
+    worlds = [World(heap(40), law, threads=n) for n in (1, 2, 4)]
+    assert all(isinstance(world._simulation, many.CrowdSimulation) for world in worlds)
+    assert state_of(worlds[0]) == state_of(worlds[1])
+    all_pairs = Simulation(heap(40), fidelity, 1, 1, False)
+    apart = []
+    for _ in range(20):
+        for world in worlds:
+            world.advance(0.02)
+        all_pairs.advance(0.02, all_pairs.everyone)
+        assert state_of(worlds[0]) == state_of(worlds[1]) == state_of(worlds[2])
+        apart.append(np.abs(worlds[0].position - all_pairs.state.dynamic["position"]).max())
+    # Sums in another order differ by round-off, which grows once the first cubes have collided;
+    # impulses are swept in another order, so they converge in another way
+    assert max(apart[:3]) < 1e-15
+    assert max(apart[:4]) < (1e-15 if law == "balanced" else 1e-4)
+    assert worlds[0].position[0, :, 2].min() > 0.8 * HALF
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_a_wall_rests_with_the_weight_of_its_cubes_on_the_ground(law):
+    world = World(wall(12, 3), law)
+    world.advance(2.0)
+    assert np.abs(world.linear_velocity).max() < 2e-3
+    contacts, bodies = world.contacts(), len(world.scene.bodies)
+    on_ground = contacts.pair.max(axis=1) >= bodies
+    weight = sum(body.mass for body in world.scene.bodies) * 9.81
+    assert contacts.force[on_ground, 2].sum() == pytest.approx(weight, rel=0.1)
+    assert contacts.normal[on_ground, 2] == pytest.approx(np.ones(on_ground.sum()))
+    assert world.normal_force(0, "static 0") == pytest.approx(3 * world.scene.bodies[0].mass * 9.81,
+                                                              rel=0.25)  # fmt: skip
+    assert 0.0 <= world.first_touch(0, "static 0")[0] < 0.1
+    assert np.isnan(world.first_touch(0, 35)[0])
+    assert world.normal_force(0, 35)[0] == 0.0
+    assert world.penetration()[0] == contacts.penetration.max()
+    # as steep as the mass of three cubes on a contact
+    assert world.penetration()[0] < 3.5 * 9.81 / (world.fidelity.contact_resolution /
+                                                  world.fidelity.substep) ** 2 * 2  # fmt: skip
+    assert np.abs(world.position[0, :, :2] - [b.position[:2] for b in world.scene.bodies]).max() < (
+        1e-3
+    )
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_snapshots_copies_and_resets_continue_bitwise(law):
+    world = World(heap(40, seed=1), law)
+    world.advance(0.3)
+    saved = world.snapshot()
+    copied, pickled = copy.deepcopy(world), pickle.loads(pickle.dumps(world))
+    for other in (world, copied, pickled):
+        other.advance(0.1)
+    assert state_of(world) == state_of(copied) == state_of(pickled)
+    after = state_of(world)
+    world.restore(saved)
+    world.advance(0.1)
+    assert state_of(world) == after
+    world.reset()
+    assert world.time[0] == 0.0
+    world.advance(0.3)
+    world.advance(0.1)
+    assert state_of(world) == after
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_momentum_and_angular_momentum_are_conserved_without_walls(law):
+    scene = heap(40, seed=2)
+    bodies = [
+        Body(CUBE, density=500.0, position=b.position, orientation=b.orientation,
+             linear_velocity=tuple(-4.0 * np.array(b.position)), angular_velocity=(5.0, 0.0, -3.0))
+        for b in scene.bodies
+    ]  # fmt: skip
+    world = World(Scene(bodies, [Ground(height=-100.0)], gravity=(0.0, 0.0, 0.0)), law)
+    before = world.linear_momentum()[0], world.angular_momentum()[0]
+    energy = world.kinetic_energy()[0]
+    world.advance(0.2)
+    assert len(world.contacts().force) > 10
+    assert world.linear_momentum()[0] == pytest.approx(before[0], abs=1e-12)
+    assert world.angular_momentum()[0] == pytest.approx(before[1], abs=1e-12)
+    assert world.kinetic_energy()[0] < 0.9 * energy
+
+
+def test_worlds_of_one_call_are_independent():
+    three = World(heap(40), "balanced", count=3)
+    three.set_state(linear_velocity=(0.5, 0.0, 0.0), worlds=np.array([False, True, False]))
+    alone = World(heap(40), "balanced")
+    three.advance(0.2)
+    alone.advance(0.2)
+    assert np.array_equal(three.position[0], alone.position[0])
+    assert np.array_equal(three.position[2], alone.position[0])
+    assert not np.array_equal(three.position[1], alone.position[0])
+    three.advance(0.02, worlds=np.array([True, False, False]))
+    assert three.time.tolist() == pytest.approx([0.22, 0.2, 0.2])
+
+
+def test_a_body_that_is_not_finite_is_named_and_the_other_worlds_are_whole():
+    world = World(heap(40), "balanced", count=2)
+    world.advance(0.1)
+    velocity = np.zeros((1, 40, 3))
+    velocity[0, 7] = 1e200
+    world.set_state(linear_velocity=velocity, worlds=np.array([True, False]))
+    with pytest.raises(SimulationDiverged, match="body 7") as failed:
+        world.advance(0.1)
+    assert failed.value.worlds == [0]
+    assert np.isfinite(world.position[1]).all()
+    world.reset(np.array([True, False]))
+    world.advance(0.1)
+
+
+def test_a_wrench_lifts_one_cube():
+    world = World(wall(12, 3), "balanced")
+    world.advance(0.5)
+    world.apply_wrench(force=(0.0, 0.0, 1.0), body=30)
+    before = world.position[0, :, 2].copy()
+    world.advance(0.1)
+    risen = world.position[0, :, 2] - before
+    assert risen[30] > 0.01
+    assert np.abs(np.delete(risen, 30)).max() < 2e-3
+
+
+def test_the_largest_stable_step_is_that_of_all_pairs():
+    world = World(heap(40), "balanced")
+    all_pairs = Simulation(heap(40), world.fidelity, 1, 1, False)
+    world.advance(0.1)
+    all_pairs.advance(0.1, all_pairs.everyone)
+    expected = LaneQueries(all_pairs).largest_stable_step(0)
+    assert world.largest_stable_step() == pytest.approx(expected, rel=3e-3)
+
+
+def test_memory_and_pairs_grow_with_the_number_of_bodies():
+    small, large = World(wall(20, 2), "balanced"), World(wall(400, 2), "balanced")
+    for world in (small, large):
+        world.advance(0.02)
+    assert large.nbytes / 800 < 1.2 * small.nbytes / 40
+    assert large._simulation.model.half_pair.size == 0
+
+
+def test_the_samples_of_a_solid_are_those_of_its_own_spacing():
+    world = World(heap(40), "balanced")
+    points, radius = world.samples(0)
+    assert points.shape == (20, 3)  # corners and the middles of edges
+    assert radius == pytest.approx(0.025 * HALF)
+    assert len(world.samples("static 0")[0]) == 0  # the ground
+
+
+def test_what_is_not_recorded_says_so():
+    world = World(heap(40), "balanced")
+    with pytest.raises(ValueError, match=r"first_touch_position is not recorded in a world of 40"):
+        world.first_touch_position(0, "static 0")
+    with pytest.raises(ValueError, match="must be solids that can touch"):
+        world.first_touch("static 0", "static 1")
+
+
+def test_a_stiffness_that_is_too_large_for_the_step_is_refused():
+    cubes = wall(12, 3)
+    stiff = [
+        Body(CUBE, density=500.0, position=b.position,
+             material=type(b.material)(friction=0.6, stiffness=1e6))
+        for b in cubes.bodies
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="the largest safe step is"):
+        World(Scene(stiff, cubes.statics), Fidelity())
