@@ -17,6 +17,7 @@ from physics.manybody.tables import (
     ROTATION_BOUND,
     Crowd,
     Pairs,
+    check_memory,
     copy_pairs,
     no_pairs,
     with_room,
@@ -150,6 +151,7 @@ class PairLists:
         batches = len(self.pairs.kind) + more
         rows = int(self._free.used[1]) + more * slots, int(self._free.used[2]) + more * work
         enough = max(rows[0], self.pairs.candidate.shape[1]), max(rows[1], len(self.pairs.work))
+        check_memory(self.pairs, batches, *enough)
         self.pairs = with_room(self.pairs, self._kinds.features, batches, *enough)
         following = np.full(batches * LANES, -1)
         following[: len(self._free.next_free)] = self._free.next_free

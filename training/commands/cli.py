@@ -111,6 +111,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     flags.add_play(playing)
 
+    scene = command(
+        "scene", handlers.scene, "Run many bodies in one world and show its speed.", ("train", ())
+    )
+    flags.add_scene(scene)
+
     plotting = command("plot", handlers.plot, "Plot the learning curve of one or several runs.")
     flags.add_plot(plotting)
 

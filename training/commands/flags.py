@@ -77,6 +77,19 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """Flags of a scene of many bodies."""
+    parser.add_argument("scene", metavar="SCENE", help="pyramid, dominoes, rubble or heap")
+    parser.add_argument(
+        "--bodies", type=count, default=1000, help="number of bodies (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seconds", type=positive, default=2.0, help="simulated time (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=whole, help="of what is random in the scene (default: 0)")
+    parser.add_argument("--threads", type=count, help="(default: all cores)")
+
+
 def add_latest(parser: argparse.ArgumentParser) -> None:
     """Flags that select the latest run, or describe a model.zip outside a run folder."""
     parser.add_argument(
@@ -261,6 +274,15 @@ def count(text: str) -> int:
 def whole(text: str) -> int:
     """Parses an integer of at least 0."""
     return _integer(text, 0)
+
+
+def positive(text: str) -> float:
+    """Parses a finite number above 0."""
+    with suppress(ValueError):
+        value = float(text)
+        if 0.0 < value < float("inf"):
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} should be a finite number above 0")
 
 
 def _integer(text: str, least: int) -> int:

@@ -128,6 +128,16 @@ def play(options: argparse.Namespace) -> int:
     return 0
 
 
+def scene(options: argparse.Namespace) -> int:
+    """Runs a scene of many bodies."""
+    from training.commands import scene as scenes
+
+    made = scenes.run(
+        options.scene, options.bodies, options.seconds, options.seed or 0, options.threads
+    )
+    return INTERRUPTED if made.interrupted else 0
+
+
 def plot(options: argparse.Namespace) -> int:
     """Plots learning curves."""
     from training.results.plot import plot_learning_curves

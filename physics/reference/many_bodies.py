@@ -1,0 +1,132 @@
+"""Scenes of many bodies: heaps, a pyramid, dominoes and rubble, of any number of bodies."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.material import Material
+from physics.scene.scene import Scene
+from physics.scene.shapes import Box, Capsule, Shape, Sphere
+from physics.scene.solids import Body, Ground, Static
+
+# m, half the edge of a cube of the tasks
+HALF = 0.02
+
+
+class LargeScene(NamedTuple):
+    """A scene of many bodies and the fidelity that suits it."""
+
+    scene: Scene
+    fidelity: Fidelity
+
+
+def heap(count: int, seed: int = 0, half: float = HALF, shapes: Sequence[Shape] = ()) -> LargeScene:
+    """Cubes, or other shapes, fall onto the ground between four walls.
+
+    They start on a lattice that is about half as high as it is wide, at random orientations and
+    with a distance at which no two overlap.
+
+    Args:
+        count: number of bodies.
+        seed: of the orientations, of small displacements and of the choice among `shapes`.
+        half: m, half the edge of a cube.
+        shapes: of the bodies, chosen at random; cubes by default.
+    """
+    random = np.random.default_rng(seed)
+    choice = list(shapes) or [Box((half, half, half))]
+    apart = 2.0 * max(shape.reach for shape in choice) + 0.2 * half
+    side = max(2, round((2 * count) ** (1 / 3)))
+    material = Material(friction=0.5)
+    bodies = []
+    for k in range(count):
+        place = np.array([k % side - side / 2, k // side % side - side / 2, k // side**2 + 0.6])
+        bodies.append(
+            Body(
+                choice[random.integers(len(choice))],
+                density=500.0,
+                position=tuple(apart * place + random.uniform(-0.1, 0.1, 3) * half),
+                orientation=tuple(random.normal(size=4)),
+                material=material,
+            )
+        )
+    inside, thick = (side / 2 + 0.5) * apart, 2.0 * half
+    height = (count / side**2 + 2.0) * apart
+    far = inside + thick
+    walls = [
+        Static(Box((x, y, height)), position=(px, py, height), material=material)
+        for x, y, px, py in (
+            (far, thick, 0.0, -far), (far, thick, 0.0, far),
+            (thick, inside, -far, 0.0), (thick, inside, far, 0.0),
+        )
+    ]  # fmt: skip
+    return LargeScene(Scene(bodies, [Ground(material), *walls]), PRESETS["balanced"])
+
+
+def rubble(count: int, seed: int = 0) -> LargeScene:
+    """Boxes, balls and capsules of a few sizes fall between four walls."""
+    sizes = [HALF * factor for factor in (0.6, 0.8, 1.0)]
+    shapes: list[Shape] = [Box((r, 0.8 * r, 0.6 * r)) for r in sizes]
+    shapes += [Sphere(r) for r in sizes] + [Capsule(0.5 * r, 0.6 * r) for r in sizes]
+    return heap(count, seed, shapes=shapes)
+
+
+def pyramid(count: int, seed: int = 0, gap: float = 0.05) -> LargeScene:
+    """Rows of cubes of 1 m, each on two of the row below, as many rows as `count` allows.
+
+    Args:
+        count: number of cubes, at most; rows are complete.
+        seed: not used: nothing is random.
+        gap: m, between the cubes of a row.
+    """
+    base = int((math.sqrt(8 * count + 1) - 1) / 2)
+    material, half = Material(friction=0.6), 0.5
+    bodies = [
+        Body(
+            Box((half, half, half)),
+            position=((k - (base - row - 1) / 2) * (1.0 + gap), 0.0, half + row),
+            material=material,
+        )
+        for row in range(base)
+        for k in range(base - row)
+    ]
+    # substeps as in four per frame of a screen with 60 Hz
+    fidelity = Fidelity(law="impulse", contact_resolution=1.8, substep=1.0 / 240.0)
+    return LargeScene(Scene(bodies, [Ground(material)]), fidelity)
+
+
+def dominoes(count: int, seed: int = 0) -> LargeScene:
+    """Dominoes of 5 cm in a spiral; the first one is pushed over."""
+    half = (0.004, 0.0125, 0.025)
+    material = Material(friction=0.3)
+    apart, turn = 0.02, 0.05  # m along the spiral, and between its turns
+    bodies, angle = [], 4.0 * math.pi
+    for n in range(count):
+        radius = turn * angle / (2.0 * math.pi)
+        heading = angle + 0.5 * math.pi
+        bodies.append(
+            Body(
+                Box(half),
+                density=1000.0,
+                position=(radius * math.cos(angle), radius * math.sin(angle), half[2]),
+                orientation=(0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading)),
+                angular_velocity=(
+                    (-6.0 * math.sin(heading), 6.0 * math.cos(heading), 0.0)
+                    if n == 0
+                    else (0.0, 0.0, 0.0)
+                ),
+                material=material,
+            )
+        )
+        angle += apart / radius
+    return LargeScene(Scene(bodies, [Ground(material)]), PRESETS["balanced"])
+
+
+SCENES: dict[str, Callable[[int, int], LargeScene]] = {
+    "pyramid": pyramid,
+    "dominoes": dominoes,
+    "rubble": rubble,
+    "heap": heap,
+}

@@ -1,0 +1,66 @@
+"""Scenes of many bodies from the command line."""
+
+import re
+
+import pytest
+
+from physics import World
+from physics.reference.many_bodies import SCENES, pyramid
+from training.commands import scene as scenes
+from training.commands.cli import main
+
+
+def test_a_scene_prints_its_speed_energy_and_penetration(capsys):
+    assert main(["scene", "heap", "--bodies", "40", "--seconds", "0.1", "--threads", "1"]) == 0
+    shown = capsys.readouterr().out
+    assert "heap: 40 bodies, law spring, substep 2 ms" in shown
+    assert re.search(r"\d+ steps/s, .* simulated seconds a second", shown)
+    assert re.search(
+        r"0\.100 s simulated in 50 steps; energy .* J, deepest penetration .* mm", shown
+    )
+
+
+def test_ctrl_c_ends_a_scene_with_what_was_made(capsys, monkeypatch):
+    advance, calls = World.advance, []
+
+    def interrupted(world, time):
+        calls.append(time)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        advance(world, time)
+
+    monkeypatch.setattr(World, "advance", interrupted)
+    assert main(["scene", "heap", "--bodies", "40", "--seconds", "1", "--threads", "1"]) == 130
+    shown = capsys.readouterr().out
+    assert "0.042 s simulated in 21 steps" in shown
+    assert "Traceback" not in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["cards"], r"unknown scene 'cards': choose one of pyramid, dominoes"),
+        (["heap", "--bodies", "0"], r"'0' should be an integer of at least 1"),
+        (["heap", "--seconds", "-1"], r"'-1' should be a finite number above 0"),
+        (["heap", "--seconds", "nan"], r"'nan' should be a finite number above 0"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, message, capsys):
+    assert main(["scene", *arguments]) == 2
+    shown = capsys.readouterr().err
+    assert re.search(message, shown)
+    assert shown.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_scenes_have_as_many_bodies_as_asked_for_and_none_overlap_deeply(name):
+    scene, fidelity = SCENES[name](45, 3)
+    assert len(scene.bodies) == 45
+    assert scenes.SCENES is SCENES
+    if name != "pyramid":
+        assert fidelity.law == "spring"
+
+
+def test_a_pyramid_has_complete_rows():
+    assert len(pyramid(5050).scene.bodies) == 5050
+    assert len(pyramid(54).scene.bodies) == 45

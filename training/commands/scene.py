@@ -1,0 +1,96 @@
+"""Runs a scene of many bodies in one world, and shows how fast and how far it is."""
+
+import math
+import sys
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.reference.many_bodies import SCENES
+from physics.world import World
+from training.settings.errors import UsageError
+
+# s of simulated time between two lines of the counter
+_SHOWN_EVERY = 0.04
+
+
+class SceneRun(NamedTuple):
+    """What was made.
+
+    Attributes:
+        seconds: s of simulated time.
+        wall: s that it took, without compiling.
+        steps: substeps.
+        energy: J, kinetic and potential, at the end.
+        penetration: m, the deepest at the end.
+        interrupted: ended by Ctrl-C.
+    """
+
+    seconds: float
+    wall: float
+    steps: int
+    energy: float
+    penetration: float
+    interrupted: bool
+
+
+def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) -> SceneRun:
+    """Runs a scene and prints its progress; Ctrl-C ends it with what was made so far.
+
+    Raises:
+        UsageError: no such scene, or more bodies than memory can hold.
+    """
+    if name not in SCENES:
+        raise UsageError(f"unknown scene {name!r}: choose one of {', '.join(SCENES)}")
+    scene, fidelity = SCENES[name](bodies, seed)
+    world = World(scene, fidelity, threads=threads)
+    count = len(scene.bodies)
+    print(f"{name}: {count} bodies, law {fidelity.law}, substep {fidelity.substep * 1e3:.3g} ms")
+    substeps = max(1, round(_SHOWN_EVERY / fidelity.substep))
+    frame, steps, wall, interrupted = substeps * fidelity.substep, 0, 0.0, False
+    try:
+        world.advance(fidelity.substep)  # compiles the kernels
+        steps = 1
+        while float(world.time[0]) < seconds - 1e-9:
+            span = min(frame, seconds - float(world.time[0]))
+            start = time.perf_counter()
+            world.advance(span)
+            wall += time.perf_counter() - start
+            steps += math.ceil(span / fidelity.substep * (1.0 - 1e-12))
+            _show(world, steps, wall, seconds)
+    except KeyboardInterrupt:
+        interrupted = True
+    energy = float(world.kinetic_energy()[0] + world.potential_energy()[0])
+    made = SceneRun(
+        float(world.time[0]), wall, steps, energy, float(world.penetration()[0]), interrupted
+    )
+    _summarise(made, count)
+    return made
+
+
+def _show(world: World, steps: int, wall: float, seconds: float) -> None:
+    """One line that replaces the last one; nothing where the output is not a terminal."""
+    if not sys.stdout.isatty():
+        return
+    now, fastest = float(world.time[0]), float(np.abs(world.linear_velocity).max())
+    print(
+        f"\r{now:7.2f} of {seconds:g} s  {steps / wall:8.0f} steps/s  "
+        f"{now / wall:6.2f} simulated s per s  fastest {fastest:5.2f} m/s",
+        end="", flush=True,
+    )  # fmt: skip
+
+
+def _summarise(made: SceneRun, bodies: int) -> None:
+    if sys.stdout.isatty():
+        print()
+    if made.wall > 0.0:
+        rate = made.steps / made.wall
+        print(
+            f"{rate:.0f} steps/s, {1e-6 * rate * bodies:.3f} million body-steps/s, "
+            f"{made.seconds / made.wall:.3f} simulated seconds a second"
+        )
+    print(
+        f"{made.seconds:.3f} s simulated in {made.steps} steps; energy {made.energy:.6g} J, "
+        f"deepest penetration {1e3 * made.penetration:.3g} mm"
+    )
