@@ -65,7 +65,8 @@ def clear_lane(row, i, remaining_skin):
 @cache
 def make_merge(features: Features):
     """Entry point: which pairs of a new list have homes; releases the homes of the others."""
-    sources, clear = SOURCES, make_clear(features)
+    sources = SOURCES
+    clear = make_clear(features)
 
     @entry
     def merge(model, pairs, pair_kind, free, bodies, places, old, old_homes, new, homes):
@@ -112,7 +113,8 @@ def make_merge(features: Features):
 @cache
 def make_settle(features: Features):
     """Entry point: gives homes to pairs that have none."""
-    sources, coloured = SOURCES, features.impulse
+    sources = SOURCES
+    coloured = features.impulse
 
     @stage
     def free_colour(free, one, two, bodies):

@@ -8,11 +8,11 @@ Those that found no colour are solved one after the other.
 import math
 from functools import cache
 
+from physics.compiler.barrier import wait
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry, sequence, stage
 from physics.impulse.restitution import MAX_SWEEPS
 from physics.integrators.kick import make_kick
-from physics.manybody.barrier import wait
 from physics.manybody.blocks import (
     add_contacts,
     block_model,

@@ -56,7 +56,8 @@ def make_occupancy():
 @cache
 def make_repack(features: Features):
     """Entry point: moves all pairs."""
-    sources, clear = SOURCES, make_clear(features)
+    sources = SOURCES
+    clear = make_clear(features)
     memory_size = contact_memory(features).size
     impulse, particles = features.impulse, features.particles
 

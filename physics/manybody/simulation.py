@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from physics.compiler.barrier import new_barrier
 from physics.compiler.jit import LANES, aligned_zeros
-from physics.manybody.barrier import new_barrier
 from physics.manybody.impulse_steps import SHARED, make_impulse_steps
 from physics.manybody.kinds import Kinds, find_kinds
 from physics.manybody.pair_lists import PairLists

@@ -7,10 +7,10 @@ order, so the result does not depend on the number of threads.
 
 from functools import cache
 
+from physics.compiler.barrier import wait
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry
 from physics.integrators.kick import make_kick
-from physics.manybody.barrier import wait
 from physics.manybody.batches import make_batch_forces
 from physics.manybody.blocks import (
     add_contacts,

@@ -39,11 +39,11 @@ def heap(count: int, seed: int = 0, friction: float = 0.5) -> Scene:
 
 
 def wall(columns: int, rows: int) -> Scene:
-    """A wall of cubes of 4 cm, in columns that touch."""
+    """Cubes of 4 cm in columns beside each other."""
     material = Material(friction=0.6)
     cube = Box((HALF, HALF, HALF))
     bodies = [
-        Body(cube, density=500.0, position=(2 * HALF * x, 0.0, HALF * (2 * z + 1)),
+        Body(cube, density=500.0, position=(2.1 * HALF * x, 0.0, HALF * (2 * z + 1)),
              material=material)
         for z in range(rows) for x in range(columns)
     ]  # fmt: skip
