@@ -1,6 +1,7 @@
 """Builds a model: the tables of a scene at a fidelity, and the features that it needs."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ from physics.scene.validation import IDENTITY
 Array = np.ndarray
 
 
-def _per_world_dtype(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
+def per_world_dtype(dtype: np.dtype, fields: Sequence[str]) -> np.dtype:
     """The rows of a lane group: these fields with one entry per lane."""
     assert dtype.names is not None
     assert dtype.fields is not None
@@ -103,7 +104,7 @@ def expand_per_world(model: Model, count: int) -> Model:
         (model.half_pair, HALF_PAIR_PER_WORLD),
         (model.compound_part, COMPOUND_PART_PER_WORLD),
     ):
-        table = aligned_zeros((-(-count // LANES), len(rows)), _per_world_dtype(rows.dtype, fields))
+        table = aligned_zeros((-(-count // LANES), len(rows)), per_world_dtype(rows.dtype, fields))
         for name in rows.dtype.names or ():
             table[name] = rows[name][..., None] if name in fields else rows[name]
         tables.append(table)
@@ -136,6 +137,21 @@ def _dynamic_rows(scene: Scene) -> Array:
         first = len(scene.bodies) + index
         rows["gripper_partner"][first : first + 2] = first + 1, first
         rows["grip_limit"][first : first + 2] = gripper.grip_limit
+    return rows
+
+
+def build_dynamic(scene: Scene, fidelity: Fidelity, bodies: Sequence[Body]) -> Array:
+    """Rows of DYNAMIC of some bodies under a scene's gravity, without the pairs that they form."""
+    alone = Scene(bodies=[replace(body, name=None, density=None) for body in bodies])
+    count = len(bodies)
+    layout = Layout(
+        solids=tuple(bodies), dynamic_count=count, bodies=count, half_pairs=(), parts=(),
+        modes=np.ones((count, 2)), leverage=np.zeros(count), rolls=np.zeros(count, dtype=bool),
+        gravity=np.array(scene.gravity), fidelity=fidelity,
+    )  # fmt: skip
+    rows = _dynamic_rows(alone)
+    for name, values in dynamic_columns(layout, Parameters.of(alone)).items():
+        rows[name] = values[0]
     return rows
 
 
