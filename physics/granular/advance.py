@@ -90,6 +90,7 @@ def make_rebuild(features):
     @stage
     def rebuild(heap, constants, scratch, thread, threads, region, evaluation):
         groups = heap.body.shape[0]
+        wait_for_all(scratch.sync, BARRIER, threads)  # until all know that the list is used up
         if thread == 0:
             adapt_skin(heap, constants)
             scratch.result[NEEDED] = set_up_grid(heap, scratch)
