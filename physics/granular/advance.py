@@ -9,13 +9,22 @@ A kernel can't allocate. Where a list has no room it returns, the caller makes r
 again: it continues where it stopped.
 """
 
+import math
 from functools import cache
 from typing import Any
 
 from physics.compiler.atomics import fetch_add, wait_for_all
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
-from physics.granular.body_pass import DRIFT, KICK, LOAD, STORE, SUM, first_not_finite, make_body_pass
+from physics.granular.body_pass import (
+    DRIFT,
+    KICK,
+    LOAD,
+    STORE,
+    SUM,
+    first_not_finite,
+    make_body_pass,
+)
 from physics.granular.grid import (
     count_particles,
     find_cells,
@@ -31,13 +40,17 @@ from physics.granular.tables import (
     DIVERGED,
     DONE,
     EVALUATION,
+    LEAST_OF,
     MORE_FORCES,
     MORE_PAIRS,
     MORE_WALLS,
+    MOST,
+    MOST_OF,
     NEEDED,
     PARITY,
     REBUILDS,
     REFRESH,
+    ROTATION,
     SINCE,
     SKIN,
     SLABS,
@@ -71,6 +84,29 @@ def adapt_skin(heap, constants):
     if heap.count[VALID] != 0:  # the list has been used up; it wasn't thrown away
         skin = skin * _WIDER if steps < _SHORT else (skin * _NARROWER if steps > _LONG else skin)
     heap.scale[SKIN] = min(max(skin, constants.skins[0]), constants.skins[1])
+
+
+@stage
+def is_used_up(heap, scratch):
+    """Whether two particles may touch that are not listed as neighbours.
+
+    The motion of a pair is measured relative to the middle of all displacements, which halves it
+    while a heap falls, or where only few bodies move. Statics don't move, so next to them a body
+    may move by the whole skin.
+    """
+    most, turned, skin, square = 0.0, 0.0, heap.scale[SKIN], 0.0
+    for slab in range(SLABS):
+        far = scratch.moved[slab, MOST]
+        most = most if far <= most else far  # keeps NaN
+        turned = max(turned, scratch.moved[slab, ROTATION])
+    for axis in range(3):
+        low, high = math.inf, -math.inf
+        for slab in range(SLABS):
+            low = min(low, scratch.moved[slab, LEAST_OF + axis])
+            high = max(high, scratch.moved[slab, MOST_OF + axis])
+        square += (high - low) * (high - low)
+    of_pair = min(most, 0.5 * math.sqrt(square) + turned)
+    return not (most <= skin and of_pair <= 0.5 * skin)
 
 
 @stage
@@ -200,9 +236,7 @@ def make_advance(features: HeapFeatures) -> Any:
                     slab = take(scratch, region, threads)
                     if slab >= SLABS:
                         break
-                    body_pass(
-                        heap, constants, scratch, states, thread, slab, what, h, evaluation
-                    )
+                    body_pass(heap, constants, scratch, states, thread, slab, what, h, evaluation)
                 region += 1
                 if what & SUM:
                     if refresh:
@@ -215,15 +249,10 @@ def make_advance(features: HeapFeatures) -> Any:
                     status = DIVERGED if any_bad(scratch) else DONE
                     break
             skip = False
-            most = 0.0
-            for slab in range(SLABS):
-                most = most if scratch.moved[slab] <= most else scratch.moved[slab]
-            if heap.count[VALID] == 0 or not most <= 0.5 * heap.scale[SKIN]:
+            if heap.count[VALID] == 0 or is_used_up(heap, scratch):
                 status = SORT
                 if heap.count[REBUILDS] < SORT_AFTER:
-                    status = rebuild(
-                        heap, constants, scratch, thread, threads, region, evaluation
-                    )
+                    status = rebuild(heap, constants, scratch, thread, threads, region, evaluation)
                     region += 4
                 if status != DONE:
                     break

@@ -3,6 +3,7 @@
 The stages are those of the engine: a lane is a body here, not a world.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,10 @@ from physics.compiler.jit import LANES, at, stage
 from physics.granular.static_forces import make_static_forces
 from physics.granular.tables import (
     CENTER,
-    INVERSE_MASS,
+    LEAST_OF,
+    MOST,
+    MOST_OF,
+    ROTATION,
     SLABS,
     SPIN,
     TURN,
@@ -132,11 +136,21 @@ def write_motion(heap, group, solid):
 
 
 @stage
-def largest_motion(row, constants):
-    """m: how far any particle of a lane group has moved since the list was made; keeps NaN."""
-    reach, most = constants.core_reach, 0.0
+def measure_motion(row, constants, moved):
+    """How far a lane group has moved since the list was made; updates a row of Scratch.moved.
+
+    NaN in any body is kept in MOST.
+    """
+    reach = constants.core_reach
     c, q = row.position, row.orientation
     c0, q0 = row.listed_position, row.listed_orientation
+    for axis in range(3):
+        low, high = moved[LEAST_OF + axis], moved[MOST_OF + axis]
+        for i in range(LANES):
+            d = c[axis, i] - c0[axis, i]
+            low, high = min(low, d), max(high, d)
+        moved[LEAST_OF + axis], moved[MOST_OF + axis] = low, high
+    most, most_turned = moved[MOST], moved[ROTATION]
     for i in range(LANES):
         x, y, z = c[0, i] - c0[0, i], c[1, i] - c0[1, i], c[2, i] - c0[2, i]
         # |q - q0| is twice the sine of a quarter of the angle; q and -q are the same rotation
@@ -145,10 +159,11 @@ def largest_motion(row, constants):
             a, b = q[axis, i], q0[axis, i]
             same += (a - b) * (a - b)
             opposite += (a + b) * (a + b)
-        turned = np.sqrt(min(same, opposite))
-        moved = np.sqrt(x * x + y * y + z * z) + 2.0 * at(reach, i) * turned
-        most = most if moved <= most else moved
-    return most
+        turned = 2.0 * at(reach, i) * np.sqrt(min(same, opposite))
+        far = np.sqrt(x * x + y * y + z * z) + turned
+        most = most if far <= most else far
+        most_turned = max(most_turned, turned)
+    moved[MOST], moved[ROTATION] = most, most_turned
 
 
 @stage
@@ -176,7 +191,10 @@ def make_body_pass(features):
     def body_pass(heap, constants, scratch, states, thread, slab, what, h, evaluation):
         groups = heap.body.shape[0]
         workspace = GroupWorkspace(scratch.solid[thread : thread + 1])
-        solid, next_entry, most = workspace.solid[0], 0, 0.0
+        solid, next_entry, moved = workspace.solid[0], 0, scratch.moved[slab]
+        moved[MOST], moved[ROTATION] = 0.0, 0.0
+        for axis in range(3):
+            moved[LEAST_OF + axis], moved[MOST_OF + axis] = math.inf, -math.inf
         refresh = (what & SUM) != 0 and (what & KICK) == 0
         if what & STORE:
             scratch.bad[slab] = -1
@@ -216,12 +234,10 @@ def make_body_pass(features):
             if what & (DRIFT | LOAD):
                 kinematics(model, workspace)
                 write_motion(heap, group, solid)
-                moved = largest_motion(row, own)
-                most = most if moved <= most else moved
+                measure_motion(row, own, moved)
             if what & STORE:
                 store_states(heap, states, group, row)
                 if scratch.bad[slab] < 0:
                     scratch.bad[slab] = first_not_finite(row, group)
-        scratch.moved[slab] = most
 
     return body_pass

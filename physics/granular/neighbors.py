@@ -36,13 +36,15 @@ def keep_shear(old, new, k, evaluation):
 
 
 @stage
-def collect(scratch, near, found, p, first, last, skin):
-    """Appends those of the sorted particles first <= q < last that are near p; returns how many."""
-    points = scratch.sorted_particle
-    x, y, z, reach = points[p, 0], points[p, 1], points[p, 2], points[p, 3] + skin
+def collect(points, near, found, p, first, last, skin):
+    """Appends those of the sorted particles first <= q < last that are near p; returns how many.
+
+    `points`: flat.
+    """
+    x, y, z, reach = points[4 * p], points[4 * p + 1], points[4 * p + 2], points[4 * p + 3] + skin
     for q in range(first, last):
-        dx, dy, dz = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
-        most = points[q, 3] + reach
+        dx, dy, dz = points[4 * q] - x, points[4 * q + 1] - y, points[4 * q + 2] - z
+        most = points[4 * q + 3] + reach
         near[found] = q
         found += 1 if dx * dx + dy * dy + dz * dz < most * most else 0
     return found
@@ -57,15 +59,16 @@ def make_find_neighbors(features):
     def collect_all(heap, scratch, near, p, index):
         """Numbers of the sorted particles near p, each pair once; returns how many."""
         skin, start = heap.scale[SKIN], scratch.cell_start
+        flat = scratch.sorted_particle.reshape(4 * scratch.sorted_particle.shape[0])
         own = heap.level_of[index]
         cell, level = scratch.cell_of[index], scratch.level[own]
         across_y = level.count[2] + 2
         across_x = across_y * (level.count[1] + 2)
-        found = collect(scratch, near, 0, p, p + 1, start[cell + 1], skin)
+        found = collect(flat, near, 0, p, p + 1, start[cell + 1], skin)
         for column in range(4):
             c = cell + (across_y if column == 0 else across_x + (column - 2) * across_y)
             begin, end = cells_begin(scratch, c - 1), start[c + 1]
-            found = collect(scratch, near, found, p, begin, end, skin)
+            found = collect(flat, near, found, p, begin, end, skin)
         points = scratch.sorted_particle
         for k in range(own):
             level = scratch.level[k]
@@ -75,7 +78,7 @@ def make_find_neighbors(features):
             for column in range(9):
                 c = cell + (column // 3 - 1) * across_x + (column % 3 - 1) * across_y
                 begin, end = cells_begin(scratch, c - 1), start[c + 1]
-                found = collect(scratch, near, found, p, begin, end, skin)
+                found = collect(flat, near, found, p, begin, end, skin)
         return found
 
     @stage

@@ -18,6 +18,7 @@ from physics.granular.tables import (
     LEVEL,
     LOW,
     MOTION,
+    MOVES,
     REBUILDS,
     RESULTS,
     SCALES,
@@ -67,6 +68,7 @@ def allocate(
         order=index,
         rank=index + count * (bodies.is_ball & (not in_particle_geometry)),
         dynamic=_dynamic(bodies, index, groups),
+        reach=_reach(bodies, index, places),
         first=first,
         body_of=np.repeat(index.astype(np.int32), bodies.count),
         level_of=_levels(bodies.points[:, 3])[0].astype(np.uint8),
@@ -116,6 +118,16 @@ def _dynamic(bodies: Bodies, order: Array, groups: int) -> Array:
     return table
 
 
+def _reach(bodies: Bodies, order: Array, places: int) -> Array:
+    """[places] m, from the centre to the farthest point of the surface."""
+    outermost = np.sqrt(np.sum(bodies.points[:, :3] ** 2, axis=1)) + bodies.points[:, 3]
+    reach = np.zeros(places)
+    reach[: len(order)] = np.maximum.reduceat(outermost, np.cumsum(bodies.count) - bodies.count)[
+        order
+    ]
+    return reach
+
+
 def _levels(radii: Array) -> tuple[Array, Array]:
     """Level [n] of each particle, and the largest radius [levels] of each; each halves the size."""
     level = np.floor(np.log2(radii.max() / radii) + 1e-12).astype(int)
@@ -141,7 +153,7 @@ def scratch_for(heap: Heap, radii: Array, threads: int) -> Scratch:
         level=level,
         sorted_particle=aligned_zeros((n, 4), np.dtype(float)),
         sorted_index=np.zeros(n, np.int32),
-        moved=np.zeros(SLABS),
+        moved=np.zeros((SLABS, MOVES)),
         bad=np.zeros(SLABS, np.int64),
         total=np.zeros(SLABS, np.int64),
         wall_total=np.zeros(SLABS, np.int64),
@@ -222,6 +234,7 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
         order=order,
         rank=heap.rank[places],
         dynamic=_dynamic(bodies, order, groups),
+        reach=_reach(bodies, order, len(heap.reach)),
         first=first,
         body_of=np.repeat(np.arange(count, dtype=np.int32), counts),
         level_of=heap.level_of[particles],

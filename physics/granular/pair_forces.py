@@ -6,6 +6,8 @@ laws run in vector instructions, and the results are added body by body. All row
 with constant offsets: with several, LLVM would have to check that they don't overlap.
 """
 
+import numpy as np
+
 from physics.collision.distances import sphere_distance
 from physics.compiler.jit import stage
 from physics.granular.coefficients import contact_coefficients
@@ -13,6 +15,7 @@ from physics.granular.tables import (
     CENTER,
     CLASS,
     INVERSE_MASS,
+    MOTION,
     PARITY,
     SPIN,
     TURN,
@@ -39,57 +42,97 @@ ROWS = 54
 FORCE = _FORCE
 
 
+# rows of Heap.particle and Heap.motion, as unsigned numbers: for signed ones numba checks the sign
+_FOUR, _MOTION = np.uint64(4), np.uint64(MOTION)
+_1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
+_CENTER, _VELOCITY, _SPIN_COLUMN = np.uint64(CENTER), np.uint64(VELOCITY), np.uint64(SPIN)
+_TURN_COLUMN, _INVERSE_COLUMN = np.uint64(TURN), np.uint64(INVERSE_MASS)
+_CLASS_COLUMN, _WEIGHT_COLUMN = np.uint64(CLASS), np.uint64(WEIGHT)
+_EIGHT, _4, _5 = np.uint64(8), np.uint64(4), np.uint64(5)
+
+
 @stage
 def filter_touching(particle, pair, count, touching):
-    """Writes the indices of the pairs that touch; returns how many do."""
+    """Writes the indices of the pairs that touch; returns how many do.
+
+    `particle` and `pair` are flat.
+    """
     found = 0
     for k in range(count):
-        i, j = pair[k, 0], pair[k, 1]
-        x = particle[i, 0] - particle[j, 0]
-        y = particle[i, 1] - particle[j, 1]
-        z = particle[i, 2] - particle[j, 2]
-        reach = particle[i, 3] + particle[j, 3]
+        i, j = pair[2 * k] * _FOUR, pair[2 * k + 1] * _FOUR
+        x = particle[i] - particle[j]
+        y = particle[i + _1] - particle[j + _1]
+        z = particle[i + _2] - particle[j + _2]
+        reach = particle[i + _3] + particle[j + _3]
         touching[found] = k
         found += 1 if x * x + y * y + z * z < reach * reach else 0
     return found
 
 
+@stage
+def three(rows, first):
+    """Three numbers that follow each other."""
+    return rows[first], rows[first + _1], rows[first + _2]
+
+
+@stage
+def put_three(block, row, n, x, y, z):
+    """Writes three rows of contact n."""
+    block[row * BLOCK + n] = x
+    block[(row + 1) * BLOCK + n] = y
+    block[(row + 2) * BLOCK + n] = z
+
+
 @cached_by_features
 def make_pack(features):
-    """Stage that packs contacts first <= n < first + count of those that touch into a block."""
+    """Stage that packs contacts first <= n < first + count of those that touch into a block.
+
+    `particle`, `motion` and `pair` are flat.
+    """
     history, equal = features.history, features.equal
 
     @stage
-    def pack(heap, constants, block, touching, pair, shear, first, count, evaluation):
-        particle, motion, body_of = heap.particle, heap.motion, heap.body_of
+    def pack(
+        particle, motion, body_of, constants, block, touching, pair, shear, first, count, evaluation
+    ):
         for n in range(count):
-            k = touching[first + n]
-            i, j = pair[k, 0], pair[k, 1]
-            a, b = body_of[i], body_of[j]
-            for axis in range(3):
-                x, y = particle[i, axis], particle[j, axis]
-                block[(_BETWEEN + axis) * BLOCK + n] = x - y
-                block[(_ARM + axis) * BLOCK + n] = x - motion[a, CENTER + axis]
-                block[(_OTHER_ARM + axis) * BLOCK + n] = y - motion[b, CENTER + axis]
-            for axis in range(3):
-                block[(_RELATIVE + axis) * BLOCK + n] = (
-                    motion[a, VELOCITY + axis] - motion[b, VELOCITY + axis]
-                )
-                block[(_SPIN + axis) * BLOCK + n] = motion[a, SPIN + axis]
-                block[(_OTHER_SPIN + axis) * BLOCK + n] = motion[b, SPIN + axis]
+            k = np.uint64(touching[first + n])
+            i, j = np.uint64(pair[k * _2]), np.uint64(pair[k * _2 + _1])
+            a, b = np.uint64(body_of[i]) * _MOTION, np.uint64(body_of[j]) * _MOTION
+            i4, j4 = i * _FOUR, j * _FOUR
+            ix, iy, iz = three(particle, i4)
+            jx, jy, jz = three(particle, j4)
+            ax, ay, az = three(motion, a + _CENTER)
+            bx, by, bz = three(motion, b + _CENTER)
+            put_three(block, _BETWEEN, n, ix - jx, iy - jy, iz - jz)
+            put_three(block, _ARM, n, ix - ax, iy - ay, iz - az)
+            put_three(block, _OTHER_ARM, n, jx - bx, jy - by, jz - bz)
+            ax, ay, az = three(motion, a + _VELOCITY)
+            bx, by, bz = three(motion, b + _VELOCITY)
+            put_three(block, _RELATIVE, n, ax - bx, ay - by, az - bz)
+            ax, ay, az = three(motion, a + _SPIN_COLUMN)
+            put_three(block, _SPIN, n, ax, ay, az)
+            bx, by, bz = three(motion, b + _SPIN_COLUMN)
+            put_three(block, _OTHER_SPIN, n, bx, by, bz)
             if history:
-                lasts = shear[k, 3] == evaluation
-                for axis in range(3):
-                    block[(_SHEAR + axis) * BLOCK + n] = shear[k, axis] if lasts else 0.0
-                for axis in range(4):
-                    block[(_TURN + axis) * BLOCK + n] = motion[b, TURN + axis]
+                k4 = k * _FOUR
+                lasts = shear[k4 + _3] == evaluation
+                x, y, z = three(shear, k4)
+                put_three(
+                    block, _SHEAR, n, x if lasts else 0.0, y if lasts else 0.0, z if lasts else 0.0
+                )
+                x, y, z = three(motion, b + _TURN_COLUMN)
+                put_three(block, _TURN, n, x, y, z)
+                block[(_TURN + 3) * BLOCK + n] = motion[b + _TURN_COLUMN + _3]
             if not equal:
-                block[_RADIUS * BLOCK + n] = particle[i, 3]
-                block[_OTHER_RADIUS * BLOCK + n] = particle[j, 3]
-                block[_INVERSE * BLOCK + n] = motion[a, INVERSE_MASS]
-                block[_OTHER_INVERSE * BLOCK + n] = motion[b, INVERSE_MASS]
-                block[_WEIGHT * BLOCK + n] = motion[a, WEIGHT]
-                row = constants.contact[int(motion[a, CLASS]), int(motion[b, CLASS])]
+                block[_RADIUS * BLOCK + n] = particle[i4 + _3]
+                block[_OTHER_RADIUS * BLOCK + n] = particle[j4 + _3]
+                block[_INVERSE * BLOCK + n] = motion[a + _INVERSE_COLUMN]
+                block[_OTHER_INVERSE * BLOCK + n] = motion[b + _INVERSE_COLUMN]
+                block[_WEIGHT * BLOCK + n] = motion[a + _WEIGHT_COLUMN]
+                row = constants.contact[
+                    int(motion[a + _CLASS_COLUMN]), int(motion[b + _CLASS_COLUMN])
+                ]
                 block[_CONTACT * BLOCK + n] = row.unit_stiffness
                 block[(_CONTACT + 1) * BLOCK + n] = row.stiffness
                 block[(_CONTACT + 2) * BLOCK + n] = row.damping
@@ -255,27 +298,41 @@ def make_compute(features):
 
 @stage
 def unpack(body_of, pair, touching, block, force, shift, first, count):
-    """Adds forces and torques of a block to the rows of the bodies, `shift` before their place."""
+    """Adds forces and torques of a block to the rows of the bodies, `shift` before their place.
+
+    `pair` and `force` are flat.
+    """
+    before = np.uint64(shift)
     for n in range(count):
-        k = touching[first + n]
-        a, b = body_of[pair[k, 0]] - shift, body_of[pair[k, 1]] - shift
-        for axis in range(3):
-            f = block[(_FORCE + axis) * BLOCK + n]
-            force[a, axis] += f
-            force[b, axis] -= f
-        for axis in range(3):
-            force[a, 3 + axis] += block[(_TORQUE + axis) * BLOCK + n]
-            force[b, 3 + axis] -= block[(_OTHER_TORQUE + axis) * BLOCK + n]
+        k = np.uint64(touching[first + n]) * _2
+        a = (np.uint64(body_of[np.uint64(pair[k])]) - before) * _EIGHT
+        b = (np.uint64(body_of[np.uint64(pair[k + _1])]) - before) * _EIGHT
+        fx = block[_FORCE * BLOCK + n]
+        fy = block[(_FORCE + 1) * BLOCK + n]
+        fz = block[(_FORCE + 2) * BLOCK + n]
+        force[a] += fx
+        force[a + _1] += fy
+        force[a + _2] += fz
+        force[a + _3] += block[_TORQUE * BLOCK + n]
+        force[a + _4] += block[(_TORQUE + 1) * BLOCK + n]
+        force[a + _5] += block[(_TORQUE + 2) * BLOCK + n]
+        force[b] -= fx
+        force[b + _1] -= fy
+        force[b + _2] -= fz
+        force[b + _3] -= block[_OTHER_TORQUE * BLOCK + n]
+        force[b + _4] -= block[(_OTHER_TORQUE + 1) * BLOCK + n]
+        force[b + _5] -= block[(_OTHER_TORQUE + 2) * BLOCK + n]
 
 
 @stage
 def keep_springs(shear, touching, block, first, count, evaluation):
-    """Writes the springs of a block back, with the number of this evaluation."""
+    """Writes the springs of a block back, flat, with the number of this evaluation."""
     for n in range(count):
-        k = touching[first + n]
-        for axis in range(3):
-            shear[k, axis] = block[(_SHEAR + axis) * BLOCK + n]
-        shear[k, 3] = evaluation
+        k = np.uint64(touching[first + n]) * _FOUR
+        shear[k] = block[_SHEAR * BLOCK + n]
+        shear[k + _1] = block[(_SHEAR + 1) * BLOCK + n]
+        shear[k + _2] = block[(_SHEAR + 2) * BLOCK + n]
+        shear[k + _3] = evaluation
 
 
 @cached_by_features
@@ -290,21 +347,29 @@ def make_pair_forces(features):
     @stage
     def pair_forces(heap, constants, scratch, thread, slab, h, evaluation):
         current = heap.count[PARITY] % heap.pair.shape[0]
-        pair, room = heap.pair[current, slab], heap.pair.shape[2]
-        shear = heap.shear[current, slab * room : (slab + 1) * room] if history else heap.particle
+        room, n = heap.pair.shape[2], heap.particle.shape[0]
+        pair, particle = heap.pair[current, slab].reshape(2 * room), heap.particle.reshape(4 * n)
+        motion = heap.motion.reshape(MOTION * heap.motion.shape[0])
+        shear = particle  # not read
+        if history:
+            shear = heap.shear[current, slab * room : (slab + 1) * room].reshape(4 * room)
         touching, block = scratch.touching[thread], scratch.block[thread]
         low, high = heap.force_range[slab, 0], heap.force_range[slab, 1]
         begin = heap.force_range[slab, 2]
-        for b in range(begin, begin + high - low):
-            for axis in range(8):
-                scratch.force[b, axis] = 0.0
+        size = (high - low) * 8
+        force = scratch.force[begin : begin + high - low].reshape(size)
+        for b in range(size):
+            force[b] = 0.0
         sample = heap.particle[0, 3], heap.motion[0, INVERSE_MASS], heap.motion[0, WEIGHT]
-        count = filter_touching(heap.particle, pair, heap.pair_count[current, slab], touching)
+        count = filter_touching(particle, pair, heap.pair_count[current, slab], touching)
         for first in range(0, count, BLOCK):
             here = min(BLOCK, count - first)
-            pack(heap, constants, block, touching, pair, shear, first, here, evaluation)
+            pack(
+                particle, motion, heap.body_of, constants, block, touching, pair, shear, first,
+                here, evaluation,
+            )  # fmt: skip
             compute(constants, sample, block, here, h)
-            unpack(heap.body_of, pair, touching, block, scratch.force, low - begin, first, here)
+            unpack(heap.body_of, pair, touching, block, force, low, first, here)
             if history and h > 0.0:
                 keep_springs(shear, touching, block, first, here, evaluation + 1)
 

@@ -23,6 +23,7 @@ from physics.granular.tables import (
     CENTER,
     EVALUATION,
     INVERSE_MASS,
+    MOTION,
     PARITY,
     SLABS,
     WEIGHT,
@@ -60,20 +61,26 @@ def make_report_pairs(features: HeapFeatures) -> Any:
     def report_pairs(heap, constants, scratch, rows):
         found, evaluation = 0, heap.count[EVALUATION]
         current, room = heap.count[PARITY] % heap.pair.shape[0], heap.pair.shape[2]
+        particle = heap.particle.reshape(4 * heap.particle.shape[0])
+        motion = heap.motion.reshape(MOTION * heap.motion.shape[0])
         sample = heap.particle[0, 3], heap.motion[0, INVERSE_MASS], heap.motion[0, WEIGHT]
         block, touching = scratch.block[0], scratch.touching[0]
         for slab in range(SLABS):
-            pair = heap.pair[current, slab]
-            begin = slab * room
-            shear = heap.shear[current, begin : begin + room] if history else heap.particle
-            count = filter_touching(heap.particle, pair, heap.pair_count[current, slab], touching)
+            pair = heap.pair[current, slab].reshape(2 * room)
+            begin, shear = slab * room, particle
+            if history:
+                shear = heap.shear[current, begin : begin + room].reshape(4 * room)
+            count = filter_touching(particle, pair, heap.pair_count[current, slab], touching)
             for first in range(0, count, BLOCK):
                 here = min(BLOCK, count - first)
-                pack(heap, constants, block, touching, pair, shear, first, here, evaluation)
+                pack(
+                    particle, motion, heap.body_of, constants, block, touching, pair, shear, first,
+                    here, evaluation,
+                )  # fmt: skip
                 compute(constants, sample, block, here, 0.0)
                 for n in range(here):
                     k, row = touching[first + n], rows[found]
-                    a, b = heap.body_of[pair[k, 0]], heap.body_of[pair[k, 1]]
+                    a, b = heap.body_of[pair[2 * k]], heap.body_of[pair[2 * k + 1]]
                     row.owner, row.other = a, b
                     row.penetration = block[PENETRATION * BLOCK + n]
                     for c in range(3):
@@ -100,7 +107,10 @@ def make_report_statics(features: HeapFeatures) -> Any:
             current, room = heap.count[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
             for slab in range(SLABS):
                 for entry_of in range(heap.wall_count[current, slab]):
-                    n, s = heap.wall[current, slab, entry_of, 0], heap.wall[current, slab, entry_of, 1]
+                    n, s = (
+                        heap.wall[current, slab, entry_of, 0],
+                        heap.wall[current, slab, entry_of, 1],
+                    )
                     sx = sy = sz = 0.0
                     if history:
                         shear = heap.wall_shear[current, slab * room + entry_of]

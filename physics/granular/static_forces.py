@@ -89,14 +89,8 @@ def make_find_statics(features):
             motion, particle = heap.motion, heap.particle
             for body in range(first_body, last_body):
                 first, last = heap.first[body], heap.first[body + 1]
-                bound = 0.0
                 x, y, z = motion[body, CENTER], motion[body, CENTER + 1], motion[body, CENTER + 2]
-                for n in range(first, last):
-                    dx, dy = particle[n, 0] - x, particle[n, 1] - y
-                    dz = particle[n, 2] - z
-                    reach = (dx * dx + dy * dy + dz * dz) ** 0.5 + particle[n, 3]
-                    bound = max(bound, reach)
-                near = 0
+                near, bound = 0, heap.reach[body]
                 for s in range(constants.static.shape[0]):
                     d = static_distance(constants.static[s], x, y, z, bound)[0]
                     near += 1 if d < bound + skin else 0
@@ -177,11 +171,10 @@ def make_static_forces(features):
     """
     history, some = features.history, len(features.kinds) > 0
     static_force = make_static_force(features) if some else None
+    static_distance = make_static_distance(features) if some else None
 
     @stage
-    def static_forces(
-        heap, constants, slab, next_entry, first_body, lanes, solid, h, evaluation
-    ):
+    def static_forces(heap, constants, slab, next_entry, first_body, lanes, solid, h, evaluation):
         if some:
             current, room = heap.count[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
             count = heap.wall_count[current, slab]
@@ -191,27 +184,32 @@ def make_static_forces(features):
                 lane = heap.body_of[n] - first_body
                 if lane >= lanes:
                     break
-                k = slab * room + next_entry
+                next_entry += 1
+                radius, static = heap.particle[n, 3], constants.static[s]
+                d, _, _, _ = static_distance(
+                    static, heap.particle[n, 0], heap.particle[n, 1], heap.particle[n, 2], radius
+                )
+                if d >= radius:
+                    continue
+                k = slab * room + next_entry - 1
                 sx = sy = sz = 0.0
                 if history:
                     shear = heap.wall_shear[current, k]
                     if shear[3] == evaluation:
                         sx, sy, sz = shear[0], shear[1], shear[2]
-                penetration, _, _, _, ax, ay, az, fx, fy, fz, sx, sy, sz = static_force(
+                _, _, _, _, ax, ay, az, fx, fy, fz, sx, sy, sz = static_force(
                     heap, constants, n, s, h, sx, sy, sz
                 )
-                if penetration > 0.0:
-                    tx, ty, tz = cross(ax, ay, az, fx, fy, fz)
-                    solid.force[0, lane] += fx
-                    solid.force[1, lane] += fy
-                    solid.force[2, lane] += fz
-                    solid.torque[0, lane] += tx
-                    solid.torque[1, lane] += ty
-                    solid.torque[2, lane] += tz
-                    if history and h > 0.0:
-                        shear[0], shear[1], shear[2] = sx, sy, sz
-                        shear[3] = evaluation + 1
-                next_entry += 1
+                tx, ty, tz = cross(ax, ay, az, fx, fy, fz)
+                solid.force[0, lane] += fx
+                solid.force[1, lane] += fy
+                solid.force[2, lane] += fz
+                solid.torque[0, lane] += tx
+                solid.torque[1, lane] += ty
+                solid.torque[2, lane] += tz
+                if history and h > 0.0:
+                    shear[0], shear[1], shear[2] = sx, sy, sz
+                    shear[3] = evaluation + 1
         return next_entry
 
     return static_forces

@@ -62,7 +62,9 @@ def _reason(solid: Any, moves: bool) -> str:
     shape: Shape = solid.shape
     if not moves:
         kind = type(shape).__name__
-        return "" if isinstance(shape, _STATICS) else f".shape must be one of {_named()}, got {kind}"
+        return (
+            "" if isinstance(shape, _STATICS) else f".shape must be one of {_named()}, got {kind}"
+        )
     if not isinstance(shape, Particles | Sphere):
         return f".shape must be Particles or Sphere, got {type(shape).__name__}"
     if isinstance(shape, Particles) and len(shape.positions) == 1:

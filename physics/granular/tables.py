@@ -116,6 +116,7 @@ class Heap(NamedTuple):
         order: [bodies] index in the scene of the body at each place.
         rank: [bodies] of a pair, the body with the lower one is the owner of the contact.
         dynamic: [1] of DYNAMIC if all bodies are equal; else [groups] with a value for each lane.
+        reach: [groups * LANES] m, from the centre to the farthest point of the surface.
         first: [groups * LANES + 1] first particle of each place.
         body_of: [n] place of the body of each particle.
         level_of: [n] level of each particle in the grid.
@@ -142,6 +143,7 @@ class Heap(NamedTuple):
     order: Array
     rank: Array
     dynamic: Array
+    reach: Array
     first: Array
     body_of: Array
     level_of: Array
@@ -167,6 +169,10 @@ class Heap(NamedTuple):
         return sum(array.nbytes for array in self)
 
 
+# columns of Scratch.moved: largest motion of any particle; largest due to rotation; and smallest
+# and largest displacement of a centre along x, y and z; all in m
+MOST, ROTATION, LEAST_OF, MOST_OF = 0, 1, 2, 5
+MOVES = 8
 # elements of Scratch.result
 STATUS = 0  # see DONE
 STEPS = 1  # that have been made
@@ -194,7 +200,7 @@ class Scratch(NamedTuple):
         level: [levels] of LEVEL.
         sorted_particle: [n, 4] `Heap.particle`, sorted by cell.
         sorted_index: [n] of these.
-        moved: [SLABS] m, largest motion since the list was made.
+        moved: [SLABS, MOVES] motion since the list was made, see MOST.
         bad: [SLABS] place of the first body that isn't finite, or -1.
         total: [SLABS] particles in a range of cells; then pairs that a slab has found.
         wall_total: [SLABS] likewise pairs with statics.
