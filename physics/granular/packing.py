@@ -200,7 +200,7 @@ def cover(heap: Heap, radii: Array) -> None:
 
 
 def sort(heap: Heap, bodies: Bodies) -> Heap:
-    """The same heap with its bodies sorted by where they are, so that neighbours are near in memory.
+    """The same heap with its bodies sorted by where they are, so neighbours are near in memory.
 
     Everything moves with them, history included. The list must be made again afterwards.
     """

@@ -32,13 +32,12 @@ from physics.spring.hunt_crossley import dashpot_force
 BLOCK = 128
 # rows of a block, in units of BLOCK. In: distance of the particles, their arms from the centres of
 # their bodies, the bodies' relative velocity, their spins, the spring and the surface's quaternion
-_BETWEEN, _ARM, _OTHER_ARM, _RELATIVE, _SPIN, _OTHER_SPIN = 0, 3, 6, 9, 12, 15
-_SHEAR, _TURN = 18, 21
+_BETWEEN, _ARM, _OTHER_ARM, _RELATIVE, _SPIN, _OTHER_SPIN, _SHEAR, _TURN = range(0, 22, 3)
 # of bodies that differ: radii, inverse masses, weight, coefficients (in the order of CONTACT)
-_RADIUS, _OTHER_RADIUS, _INVERSE, _OTHER_INVERSE, _WEIGHT, _CONTACT = 25, 26, 27, 28, 29, 30
+_RADIUS, _OTHER_RADIUS, _INVERSE, _OTHER_INVERSE, _WEIGHT, _CONTACT = range(25, 31)
 # out: force and torque on the owner, torque on the surface; what a report needs
-_FORCE, _TORQUE, _OTHER_TORQUE, NORMAL, POINT_ARM, PENETRATION = 38, 41, 44, 47, 50, 53
-ROWS = 54
+_FORCE, _TORQUE, _OTHER_TORQUE, NORMAL, POINT_ARM, PENETRATION = range(38, 54, 3)
+ROWS = PENETRATION + 1
 FORCE = _FORCE
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from physics.compiler.jit import columns
 from physics.granular.advance import make_advance
 from physics.granular.classes import bodies_of, constants_of
+from physics.granular.coefficients import contact_coefficients
 from physics.granular.packing import (
     allocate,
     forget,
@@ -230,9 +231,11 @@ class GranularSimulation:
             heap = with_room_for_pairs(heap, needed)
         elif status == MORE_WALLS:
             heap = with_room_for_walls(heap, needed)
-        elif status == MORE_FORCES:
-            self._scratch = scratch._replace(force=np.zeros((needed + needed // 8, 8)))
         self.heaps[w] = heap
+        listed = int((heap.force_range[:, 1] - heap.force_range[:, 0]).sum())
+        rows = max(listed, needed if status == MORE_FORCES else 0)
+        if rows > len(scratch.force):
+            self._scratch = scratch._replace(force=np.zeros((rows + rows // 8, 8)))
         if heap.pair.shape[2] > self._scratch.touching.shape[1]:
             touching = np.zeros((self.threads, heap.pair.shape[2]), np.uint32)
             self._scratch = self._scratch._replace(touching=touching)
@@ -266,6 +269,39 @@ class GranularSimulation:
         rows, inverse = self.state.dynamic, self.of_bodies("inverse_inertia")
         back = inverse * rotate_back(rows["orientation"], rows["angular_momentum"])
         return np.asarray(rotate(rows["orientation"], back))
+
+    @property
+    def particles(self) -> tuple[Array, Array]:
+        """Body [n] of each particle; and x y z in its frame and radius, [n, 4] in m."""
+        return np.repeat(np.arange(self.bodies), self._bodies.count), self._bodies.points
+
+    def coefficients(self, first: int, second: int) -> dict[str, float]:
+        """Coefficients of the contacts of a body with another solid, in scene order.
+
+        Stiffness and shear_stiffness in N/m, damping (a ratio), shear_damping in N s/m,
+        inverse_mass of the pair in 1/kg, friction, and weight of each particle.
+        """
+        own, constants = self._bodies, self._constants
+        body = own.class_of[first]
+        if second < self.bodies:
+            row = constants.contact[body, own.class_of[second]]
+            other = own.dynamic["inverse_mass"][second]
+        else:
+            row, other = constants.static_contact[body, second - self.bodies], 0.0
+        k, inverse_mass, shear, damping = contact_coefficients(
+            row["unit_stiffness"], row["stiffness"], row["shear_ratio"], row["leverage"],
+            row["first_compliance"], row["second_compliance"],
+            own.dynamic["inverse_mass"][first], other, constants.step,
+        )  # fmt: skip
+        return {
+            "stiffness": k,
+            "shear_stiffness": shear,
+            "damping": float(row["damping"]),
+            "shear_damping": damping,
+            "inverse_mass": inverse_mass,
+            "friction": float(row["friction"]),
+            "weight": float(own.weight[first]),
+        }
 
     def contacts(self, world: int) -> Contacts:
         """The touching points of one world now."""

@@ -36,8 +36,9 @@ BODY = np.dtype(
 
 # columns of Heap.motion: what a contact reads of a body
 CENTER, VELOCITY, SPIN, TURN = 0, 3, 6, 9  # m, m/s, rad/s, quaternion x y z w
-INVERSE_MASS, CLASS, WEIGHT = 13, 14, 15  # 1/kg; row and column of Model.contact; of its particles
-MOTION = 16
+INVERSE_MASS, CLASS, WEIGHT, MOTION = range(
+    13, 17
+)  # 1/kg; row and column of Model.contact; of its particles
 
 # one row per pair of classes of bodies, or class of body and static. Classes have the same material
 # and shape, up to size. The kernel derives stiffness and friction from it and from the two masses
@@ -79,16 +80,12 @@ LEVEL = np.dtype(
 )
 
 # elements of Heap.count
-EVALUATION = 0  # number of force evaluations that contacts remember
-PARITY = 1  # which of two lists is valid
-REBUILDS = 2  # since the bodies were sorted
-SINCE = 3  # steps since the list was made
-VALID = 4  # 0: the list must be made again
-COUNTS = 5
+# force evaluations that contacts remember; which of two lists is valid; lists since the bodies were
+# sorted; steps since the list was made; 0: the list must be made again
+EVALUATION, PARITY, REBUILDS, SINCE, VALID, COUNTS = range(6)
 # elements of Heap.scale
-SKIN = 0  # m
-LOW, HIGH = 1, 4  # m, corners of the box that the grid covers
-SCALES = 7
+# m, the skin; and corners of the box that the grid covers
+SKIN, LOW, HIGH, SCALES = 0, 1, 4, 7
 
 
 class Constants(NamedTuple):
@@ -171,14 +168,11 @@ class Heap(NamedTuple):
 
 # columns of Scratch.moved: largest motion of any particle; largest due to rotation; and smallest
 # and largest displacement of a centre along x, y and z; all in m
-MOST, ROTATION, LEAST_OF, MOST_OF = 0, 1, 2, 5
-MOVES = 8
+MOST, ROTATION, LEAST_OF, MOST_OF, MOVES = 0, 1, 2, 5, 8
 # elements of Scratch.result
-STATUS = 0  # see DONE
-STEPS = 1  # that have been made
-NEEDED = 2  # room
-REFRESH = 3  # 1: the forces that are computed next belong to no step
-RESULTS = 8
+# see DONE; steps that have been made; room that is needed; 1: the forces that are computed next
+# belong to no step
+STATUS, STEPS, NEEDED, REFRESH, RESULTS = range(5)
 # why a call returns
 DONE, SORT, MORE_PAIRS, MORE_WALLS, MORE_FORCES, DIVERGED = range(6)
 # elements of Scratch.sync: counters of the barrier and of slabs that have been taken
