@@ -95,15 +95,18 @@ def is_used_up(heap, scratch):
     may move by the whole skin.
     """
     most, turned, skin, square = 0.0, 0.0, heap.scale[SKIN], 0.0
+    moved = scratch.moved
     for slab in range(SLABS):
-        far = scratch.moved[slab, MOST]
-        most = most if far <= most else far  # keeps NaN
-        turned = max(turned, scratch.moved[slab, ROTATION])
+        for i in range(LANES):
+            far = moved[slab, MOST, i]
+            most = most if far <= most else far  # keeps NaN
+            turned = max(turned, moved[slab, ROTATION, i])
     for axis in range(3):
         low, high = math.inf, -math.inf
         for slab in range(SLABS):
-            low = min(low, scratch.moved[slab, LEAST_OF + axis])
-            high = max(high, scratch.moved[slab, MOST_OF + axis])
+            for i in range(LANES):
+                low = min(low, moved[slab, LEAST_OF + axis, i])
+                high = max(high, moved[slab, MOST_OF + axis, i])
         square += (high - low) * (high - low)
     of_pair = min(most, 0.5 * math.sqrt(square) + turned)
     return not (most <= skin and of_pair <= 0.5 * skin)
@@ -145,7 +148,7 @@ def make_rebuild(features):
                 begin, end = particles_of_slab(heap, slab)
                 find_cells(heap, scratch, slab, begin, end)
                 find_statics(
-                    heap, constants, scratch, slab, first * LANES, last * LANES, evaluation
+                    heap, constants, scratch, thread, slab, first * LANES, last * LANES, evaluation
                 )
                 for group in range(first, last):
                     row = heap.body[group]

@@ -15,6 +15,7 @@ from physics.granular.tables import (
     LEAST_OF,
     MOST,
     MOST_OF,
+    MOTION,
     ROTATION,
     SLABS,
     SPIN,
@@ -111,59 +112,108 @@ def sum_forces(heap, scratch, group, solid):
 
 @stage
 def write_motion(heap, group, solid):
-    """Writes what contacts read of the bodies of a lane group, and where their particles are."""
-    R, c, q = solid.rotation, solid.position, solid.orientation
+    """Writes what contacts read of the bodies of a lane group."""
+    c, q = solid.position, solid.orientation
     v, omega = solid.velocity, solid.angular_velocity
+    first = group * LANES * MOTION
+    motion = heap.motion.reshape(MOTION * heap.motion.shape[0])[first : first + LANES * MOTION]
     for i in range(LANES):
-        motion = heap.motion[group * LANES + i]
-        for axis in range(3):
-            motion[CENTER + axis] = c[axis, i]
-            motion[VELOCITY + axis] = v[axis, i]
-            motion[SPIN + axis] = omega[axis, i]
-        for axis in range(4):
-            motion[TURN + axis] = q[axis, i]
+        n = i * MOTION
+        motion[n + CENTER], motion[n + CENTER + 1], motion[n + CENTER + 2] = (
+            c[0, i],
+            c[1, i],
+            c[2, i],
+        )
+        motion[n + VELOCITY] = v[0, i]
+        motion[n + VELOCITY + 1] = v[1, i]
+        motion[n + VELOCITY + 2] = v[2, i]
+        motion[n + SPIN] = omega[0, i]
+        motion[n + SPIN + 1] = omega[1, i]
+        motion[n + SPIN + 2] = omega[2, i]
+        motion[n + TURN], motion[n + TURN + 1] = q[0, i], q[1, i]
+        motion[n + TURN + 2], motion[n + TURN + 3] = q[2, i], q[3, i]
+
+
+@cached_by_features
+def make_write_particles(features):
+    """Stage that writes where the particles of a lane group are."""
+    equal = features.equal
+
+    @stage
+    def write_equal(heap, group, solid):
+        """All bodies have the same particles: lane by lane, particle by particle."""
+        R, c = solid.rotation, solid.position
+        # not read before the next drift
+        at_x, at_y, at_z = solid.present_velocity[0], solid.present_velocity[1], solid.weight[0]
+        first = heap.first[group * LANES]
+        each = heap.first[1] - heap.first[0]
+        lanes = (heap.first[(group + 1) * LANES] - first) // each
+        particle = heap.particle.reshape(4 * heap.particle.shape[0])
+        for k in range(each):
+            x, y, z = heap.local[k, 0], heap.local[k, 1], heap.local[k, 2]
+            for i in range(LANES):
+                at_x[i] = c[0, i] + (R[0, i] * x + R[1, i] * y + R[2, i] * z)
+                at_y[i] = c[1, i] + (R[3, i] * x + R[4, i] * y + R[5, i] * z)
+                at_z[i] = c[2, i] + (R[6, i] * x + R[7, i] * y + R[8, i] * z)
+            for i in range(lanes):
+                n = 4 * (first + k + i * each)
+                particle[n], particle[n + 1], particle[n + 2] = at_x[i], at_y[i], at_z[i]
+
+    @stage
+    def write_any(heap, group, solid):
+        R, c = solid.rotation, solid.position
+        for i in range(LANES):
+            cx, cy, cz = c[0, i], c[1, i], c[2, i]
+            r00, r01, r02 = R[0, i], R[1, i], R[2, i]
+            r10, r11, r12 = R[3, i], R[4, i], R[5, i]
+            r20, r21, r22 = R[6, i], R[7, i], R[8, i]
+            place = group * LANES + i
+            for n in range(heap.first[place], heap.first[place + 1]):
+                x, y, z = heap.local[n, 0], heap.local[n, 1], heap.local[n, 2]
+                heap.particle[n, 0] = cx + (r00 * x + r01 * y + r02 * z)
+                heap.particle[n, 1] = cy + (r10 * x + r11 * y + r12 * z)
+                heap.particle[n, 2] = cz + (r20 * x + r21 * y + r22 * z)
+
+    return write_equal if equal else write_any
+
+
+@stage
+def start_measuring(moved):
+    """Clears a row of Scratch.moved: nothing has moved yet."""
     for i in range(LANES):
-        cx, cy, cz = c[0, i], c[1, i], c[2, i]
-        r00, r01, r02 = R[0, i], R[1, i], R[2, i]
-        r10, r11, r12 = R[3, i], R[4, i], R[5, i]
-        r20, r21, r22 = R[6, i], R[7, i], R[8, i]
-        place = group * LANES + i
-        for n in range(heap.first[place], heap.first[place + 1]):
-            x, y, z = heap.local[n, 0], heap.local[n, 1], heap.local[n, 2]
-            heap.particle[n, 0] = cx + (r00 * x + r01 * y + r02 * z)
-            heap.particle[n, 1] = cy + (r10 * x + r11 * y + r12 * z)
-            heap.particle[n, 2] = cz + (r20 * x + r21 * y + r22 * z)
+        moved[MOST, i], moved[ROTATION, i] = 0.0, 0.0
+    for axis in range(3):
+        for i in range(LANES):
+            moved[LEAST_OF + axis, i], moved[MOST_OF + axis, i] = math.inf, -math.inf
 
 
 @stage
 def measure_motion(row, constants, moved):
     """How far a lane group has moved since the list was made; updates a row of Scratch.moved.
 
-    NaN in any body is kept in MOST.
+    Lane by lane, because a maximum over lanes would keep LLVM from using vectors. NaN in any body
+    is kept in MOST.
     """
     reach = constants.core_reach
     c, q = row.position, row.orientation
     c0, q0 = row.listed_position, row.listed_orientation
-    for axis in range(3):
-        low, high = moved[LEAST_OF + axis], moved[MOST_OF + axis]
-        for i in range(LANES):
-            d = c[axis, i] - c0[axis, i]
-            low, high = min(low, d), max(high, d)
-        moved[LEAST_OF + axis], moved[MOST_OF + axis] = low, high
-    most, most_turned = moved[MOST], moved[ROTATION]
     for i in range(LANES):
         x, y, z = c[0, i] - c0[0, i], c[1, i] - c0[1, i], c[2, i] - c0[2, i]
         # |q - q0| is twice the sine of a quarter of the angle; q and -q are the same rotation
-        same, opposite = 0.0, 0.0
-        for axis in range(4):
-            a, b = q[axis, i], q0[axis, i]
-            same += (a - b) * (a - b)
-            opposite += (a + b) * (a + b)
-        turned = 2.0 * at(reach, i) * np.sqrt(min(same, opposite))
-        far = np.sqrt(x * x + y * y + z * z) + turned
-        most = most if far <= most else far
-        most_turned = max(most_turned, turned)
-    moved[MOST], moved[ROTATION] = most, most_turned
+        a, b, d, e = q[0, i], q[1, i], q[2, i], q[3, i]
+        a0, b0, d0, e0 = q0[0, i], q0[1, i], q0[2, i], q0[3, i]
+        sign = 1.0 if a * a0 + b * b0 + d * d0 + e * e0 > 0.0 else -1.0
+        a, b, d, e = a - sign * a0, b - sign * b0, d - sign * d0, e - sign * e0
+        turned = 2.0 * at(reach, i) * math.sqrt(a * a + b * b + d * d + e * e)
+        far = math.sqrt(x * x + y * y + z * z) + turned
+        moved[MOST, i] = moved[MOST, i] if far <= moved[MOST, i] else far
+        moved[ROTATION, i] = moved[ROTATION, i] if turned <= moved[ROTATION, i] else turned
+    for axis in range(3):
+        for i in range(LANES):
+            x = c[axis, i] - c0[axis, i]
+            low, high = moved[LEAST_OF + axis, i], moved[MOST_OF + axis, i]
+            moved[LEAST_OF + axis, i] = x if x < low else low
+            moved[MOST_OF + axis, i] = x if x > high else high
 
 
 @stage
@@ -184,6 +234,7 @@ def make_body_pass(features):
     """Stage that moves the bodies of a slab; `what`: SUM, KICK, DRIFT, LOAD, STORE in sum."""
     kick, drift = make_kick(features), make_drift(features)
     kinematics, static_forces = make_kinematics(features), make_static_forces(features)
+    write_particles = make_write_particles(features)
     equal, euler = features.equal, features.integrator == EULER
     before = 1.0 if euler else 0.5
 
@@ -192,9 +243,7 @@ def make_body_pass(features):
         groups = heap.body.shape[0]
         workspace = GroupWorkspace(scratch.solid[thread : thread + 1])
         solid, next_entry, moved = workspace.solid[0], 0, scratch.moved[slab]
-        moved[MOST], moved[ROTATION] = 0.0, 0.0
-        for axis in range(3):
-            moved[LEAST_OF + axis], moved[MOST_OF + axis] = math.inf, -math.inf
+        start_measuring(moved)
         refresh = (what & SUM) != 0 and (what & KICK) == 0
         if what & STORE:
             scratch.bad[slab] = -1
@@ -234,6 +283,7 @@ def make_body_pass(features):
             if what & (DRIFT | LOAD):
                 kinematics(model, workspace)
                 write_motion(heap, group, solid)
+                write_particles(heap, group, solid)
                 measure_motion(row, own, moved)
             if what & STORE:
                 store_states(heap, states, group, row)

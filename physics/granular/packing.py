@@ -153,7 +153,7 @@ def scratch_for(heap: Heap, radii: Array, threads: int) -> Scratch:
         level=level,
         sorted_particle=aligned_zeros((n, 4), np.dtype(float)),
         sorted_index=np.zeros(n, np.int32),
-        moved=np.zeros((SLABS, MOVES)),
+        moved=aligned_zeros((SLABS, MOVES, LANES), np.dtype(float)),
         bad=np.zeros(SLABS, np.int64),
         total=np.zeros(SLABS, np.int64),
         wall_total=np.zeros(SLABS, np.int64),

@@ -5,7 +5,7 @@ summed. Springs of contacts with statics are stored in the world frame.
 """
 
 from physics.collision.distances import core_distance
-from physics.compiler.jit import stage
+from physics.compiler.jit import LANES, stage
 from physics.granular.coefficients import contact_coefficients
 from physics.granular.neighbors import find_old, keep_shear
 from physics.granular.pair_forces import make_law
@@ -79,7 +79,7 @@ def make_find_statics(features):
     static_distance = make_static_distance(features) if some else None
 
     @stage
-    def find_statics(heap, constants, scratch, slab, first_body, last_body, evaluation):
+    def find_statics(heap, constants, scratch, thread, slab, first_body, last_body, evaluation):
         lists, room = heap.wall.shape[0], heap.wall.shape[2]
         old, new = heap.count[PARITY] % lists, (heap.count[PARITY] + 1) % lists
         total = 0
@@ -87,16 +87,30 @@ def make_find_statics(features):
             skin = heap.scale[SKIN]
             flat = heap.wall[old].reshape(SLABS * room, 2)
             motion, particle = heap.motion, heap.particle
+            # a lane group at a time, for vector instructions
+            center, bound, near = (
+                scratch.solid[thread].position,
+                scratch.solid[thread].weight[0],
+                (scratch.solid[thread].weight[1]),
+            )
             for body in range(first_body, last_body):
+                lane = body % LANES
+                if lane == 0:
+                    for i in range(LANES):
+                        for axis in range(3):
+                            center[axis, i] = motion[body + i, CENTER + axis]
+                        bound[i], near[i] = heap.reach[body + i], 0.0
+                    for s in range(constants.static.shape[0]):
+                        static = constants.static[s]
+                        for i in range(LANES):
+                            d, _, _, _ = static_distance(
+                                static, center[0, i], center[1, i], center[2, i], bound[i]
+                            )
+                            near[i] += 1.0 if d < bound[i] + skin else 0.0
                 first, last = heap.first[body], heap.first[body + 1]
-                x, y, z = motion[body, CENTER], motion[body, CENTER + 1], motion[body, CENTER + 2]
-                near, bound = 0, heap.reach[body]
-                for s in range(constants.static.shape[0]):
-                    d = static_distance(constants.static[s], x, y, z, bound)[0]
-                    near += 1 if d < bound + skin else 0
                 for n in range(first, last):
                     begin = total
-                    if near > 0:
+                    if near[lane] > 0.0:
                         for s in range(constants.static.shape[0]):
                             r = particle[n, 3]
                             d, _, _, _ = static_distance(

@@ -194,7 +194,7 @@ class Scratch(NamedTuple):
         level: [levels] of LEVEL.
         sorted_particle: [n, 4] `Heap.particle`, sorted by cell.
         sorted_index: [n] of these.
-        moved: [SLABS, MOVES] motion since the list was made, see MOST.
+        moved: [SLABS, MOVES, LANES] motion since the list was made, see MOST.
         bad: [SLABS] place of the first body that isn't finite, or -1.
         total: [SLABS] particles in a range of cells; then pairs that a slab has found.
         wall_total: [SLABS] likewise pairs with statics.
