@@ -56,7 +56,7 @@ def _run(python: Path, simulation: GranularSimulation, steps: int, skin: float) 
         (place / "data").write_text(_data(simulation))
         (place / "in").write_text(_script(simulation, steps, skin))
         beside = python.parent
-        command = [
+        command: list[str | Path] = [
             beside / "mpiexec", "-n", str(RANKS), beside / "lmp", "-in", "in", "-log", "log",
             "-screen", "none",
         ]  # fmt: skip
@@ -144,7 +144,8 @@ def _script(simulation: GranularSimulation, steps: int, skin: float) -> str:
     return "\n".join(
         [
             "units si", "atom_style sphere", "boundary f f f", "newton on",
-            f"comm_modify vel yes cutoff {cutoff!r}", "atom_modify map array", f"processors {RANKS} 1 1",
+            f"comm_modify vel yes cutoff {cutoff!r}", "atom_modify map array",
+            f"processors {RANKS} 1 1",
             "fix body all property/atom mol ghost yes", "read_data data fix body NULL Molecules",
             f"neighbor {skin * radius} bin", "neigh_modify delay 0 every 1 check yes",
             f"pair_style gran/{style} {_coefficients(simulation, False)}",

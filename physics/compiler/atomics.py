@@ -24,8 +24,7 @@ def _pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return cgutils.get_item_pointer(context, builder, kind, array, [arguments[1]])
 
 
-@intrinsic
-def fetch_add(typingctx: Any, counters: Any, index: Any, amount: Any) -> Any:
+def _fetch_add(typingctx: Any, counters: Any, index: Any, amount: Any) -> Any:
     """Adds to an element of an int64 array at once for all threads; returns what it was before."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -35,8 +34,7 @@ def fetch_add(typingctx: Any, counters: Any, index: Any, amount: Any) -> Any:
     return types.int64(counters, types.intp, types.int64), generate
 
 
-@intrinsic
-def load_now(typingctx: Any, counters: Any, index: Any) -> Any:
+def _load_now(typingctx: Any, counters: Any, index: Any) -> Any:
     """Reads an element of an int64 array as other threads have left it."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -44,6 +42,10 @@ def load_now(typingctx: Any, counters: Any, index: Any) -> Any:
         return builder.load_atomic(pointer, "seq_cst", 8)
 
     return types.int64(counters, types.intp), generate
+
+
+fetch_add: Any = intrinsic(_fetch_add)
+load_now: Any = intrinsic(_load_now)
 
 
 @stage

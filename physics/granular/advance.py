@@ -80,8 +80,8 @@ def take(scratch, region, threads):
 @stage
 def adapt_skin(heap, constants):
     """Makes the skin wider if the last list was short-lived, narrower if it lasted long."""
-    steps, skin = heap.count[SINCE], heap.scale[SKIN]
-    if heap.count[VALID] != 0:  # the list has been used up; it wasn't thrown away
+    steps, skin = heap.counts[SINCE], heap.scale[SKIN]
+    if heap.counts[VALID] != 0:  # the list has been used up; it wasn't thrown away
         skin = skin * _WIDER if steps < _SHORT else (skin * _NARROWER if steps > _LONG else skin)
     heap.scale[SKIN] = min(max(skin, constants.skins[0]), constants.skins[1])
 
@@ -194,16 +194,16 @@ def make_rebuild(features):
         if thread == 0:
             scratch.result[NEEDED] = needed
             if status == DONE:
-                heap.count[PARITY] = 1 - heap.count[PARITY]
-                heap.count[REBUILDS] += 1
-                heap.count[SINCE] = 0
-                heap.count[VALID] = 1
+                heap.counts[PARITY] = 1 - heap.counts[PARITY]
+                heap.counts[REBUILDS] += 1
+                heap.counts[SINCE] = 0
+                heap.counts[VALID] = 1
                 begin = 0
                 for slab in range(SLABS):
                     heap.force_range[slab, 2] = begin
                     begin += heap.force_range[slab, 1] - heap.force_range[slab, 0]
             else:  # the skin was adapted already
-                heap.count[VALID] = 0
+                heap.counts[VALID] = 0
         wait_for_all(scratch.sync, BARRIER, threads)
         return status
 
@@ -232,7 +232,7 @@ def make_advance(features: HeapFeatures) -> Any:
         what |= STORE if not refresh and steps == 0 else 0
         skip, status = resume != 0, DONE
         # of contacts that last: the number of the evaluation in which they touched last
-        evaluation = heap.count[EVALUATION]
+        evaluation = heap.counts[EVALUATION]
         while True:
             if not skip:
                 while True:
@@ -252,9 +252,9 @@ def make_advance(features: HeapFeatures) -> Any:
                     status = DIVERGED if any_bad(scratch) else DONE
                     break
             skip = False
-            if heap.count[VALID] == 0 or is_used_up(heap, scratch):
+            if heap.counts[VALID] == 0 or is_used_up(heap, scratch):
                 status = SORT
-                if heap.count[REBUILDS] < SORT_AFTER:
+                if heap.counts[REBUILDS] < SORT_AFTER:
                     status = rebuild(heap, constants, scratch, thread, threads, region, evaluation)
                     region += 4
                 if status != DONE:
@@ -271,13 +271,13 @@ def make_advance(features: HeapFeatures) -> Any:
             last = done + (0 if refresh else 1) >= steps
             what = SUM | (0 if refresh else KICK) | (STORE if last else DRIFT)
             if thread == 0:
-                heap.count[SINCE] += 1
+                heap.counts[SINCE] += 1
         # all threads have read what they need of `result` before
         wait_for_all(scratch.sync, BARRIER, threads)
         if thread == 0:
             scratch.result[STATUS] = status
             scratch.result[STEPS] = done
-            heap.count[EVALUATION] = evaluation
+            heap.counts[EVALUATION] = evaluation
             scratch.result[REFRESH] = 1 if refresh else 0
         return 0
 

@@ -39,7 +39,7 @@ class Bodies(NamedTuple):
         class_of: [bodies] class of each.
         weight: [bodies] of each particle, see `Samples.weights`.
         is_ball: [bodies] whether it is a Sphere.
-        count: [bodies] particles of each.
+        particles: [bodies] how many each has.
         points: [n, 4] x y z in the body's frame and radius, in m.
         equal: whether all have the same shape, mass and material.
     """
@@ -48,7 +48,7 @@ class Bodies(NamedTuple):
     class_of: Array
     weight: Array
     is_ball: Array
-    count: Array
+    particles: Array
     points: Array
     equal: bool
 
@@ -121,7 +121,7 @@ def bodies_of(scene: Scene, fidelity: Fidelity) -> tuple[Bodies, list[Body]]:
         class_of=class_of[which],
         weight=np.array(weights)[which],
         is_ball=np.array([isinstance(shape, Sphere) for shape in shapes])[which],
-        count=counts[which],
+        particles=counts[which],
         points=np.concatenate(points)[of_all],
         equal=len(examples) == 1,
     ), first

@@ -85,7 +85,7 @@ def make_find_neighbors(features):
     def find_neighbors(heap, scratch, thread, slab, evaluation):
         n = scratch.sorted_index.shape[0]
         lists, near = heap.pair.shape[0], scratch.near[thread]
-        old, new = heap.count[PARITY] % lists, (heap.count[PARITY] + 1) % lists
+        old, new = heap.counts[PARITY] % lists, (heap.counts[PARITY] + 1) % lists
         pair, room = heap.pair[new, slab], heap.pair.shape[2]
         flat = heap.pair[old].reshape(SLABS * room, 2)
         points = scratch.sorted_particle

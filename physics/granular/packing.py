@@ -49,14 +49,14 @@ def allocate(
     bodies: Bodies, constants: Constants, features: HeapFeatures, in_particle_geometry: bool
 ) -> Heap:
     """A heap in which nothing is listed yet, and nothing is anywhere."""
-    count, n = len(bodies.count), len(bodies.points)
+    count, n = len(bodies.particles), len(bodies.points)
     groups = -(-count // LANES)
     lists, places = 1 + features.history, groups * LANES
     room = int(_FIRST_PAIRS * n / SLABS) + LANES
     remembered = features.history
     index = np.arange(count)
     first = np.zeros(places + 1, np.int32)
-    first[1 : count + 1] = np.cumsum(bodies.count)
+    first[1 : count + 1] = np.cumsum(bodies.particles)
     first[count + 1 :] = n
     particle = aligned_zeros((n, 4), np.dtype(float))
     particle[:, 3] = bodies.points[:, 3]
@@ -70,7 +70,7 @@ def allocate(
         dynamic=_dynamic(bodies, index, groups),
         reach=_reach(bodies, index, places),
         first=first,
-        body_of=np.repeat(index.astype(np.int32), bodies.count),
+        body_of=np.repeat(index.astype(np.int32), bodies.particles),
         level_of=_levels(bodies.points[:, 3])[0].astype(np.uint8),
         local=bodies.points.copy(),
         body=aligned_zeros(groups, BODY),
@@ -85,7 +85,7 @@ def allocate(
         wall_range=np.zeros((lists, n if remembered else 0, 2), np.int32),
         wall_shear=np.zeros((lists, SLABS * LANES if remembered else 0, 4)),
         force_range=np.zeros((SLABS, 3), np.int64),
-        count=_first_counts(),
+        counts=_first_counts(),
         scale=_first_scale(constants),
     )
 
@@ -122,9 +122,9 @@ def _reach(bodies: Bodies, order: Array, places: int) -> Array:
     """[places] m, from the centre to the farthest point of the surface."""
     outermost = np.sqrt(np.sum(bodies.points[:, :3] ** 2, axis=1)) + bodies.points[:, 3]
     reach = np.zeros(places)
-    reach[: len(order)] = np.maximum.reduceat(outermost, np.cumsum(bodies.count) - bodies.count)[
-        order
-    ]
+    reach[: len(order)] = np.maximum.reduceat(
+        outermost, np.cumsum(bodies.particles) - bodies.particles
+    )[order]
     return reach
 
 
@@ -214,9 +214,9 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
     places = np.lexsort(cells.T[::-1])  # by x, then y, then z
     order = before[places]
     first = np.zeros_like(heap.first)
-    first[1 : count + 1] = np.cumsum(bodies.count[order])
+    first[1 : count + 1] = np.cumsum(bodies.particles[order])
     first[count + 1 :] = first[count]
-    counts = bodies.count[order]
+    counts = bodies.particles[order]
     particles = np.repeat(heap.first[places], counts) + _within(counts)
     where = np.empty_like(particles)  # new index of each particle
     where[particles] = np.arange(len(particles))
@@ -229,7 +229,7 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
     groups = len(heap.body)
     motion = aligned_zeros(heap.motion.shape, heap.motion.dtype)
     motion[:count] = heap.motion[places]
-    heap.count[REBUILDS] = heap.count[VALID] = 0
+    heap.counts[REBUILDS] = heap.counts[VALID] = 0
     return heap._replace(
         order=order,
         rank=heap.rank[places],
@@ -278,5 +278,5 @@ def _sorted_rows(body: Array, places: Array) -> Array:
 
 def forget(heap: Heap) -> None:
     """Contacts remember nothing, and the list must be made again."""
-    heap.count[EVALUATION] += 1
-    heap.count[VALID] = 0
+    heap.counts[EVALUATION] += 1
+    heap.counts[VALID] = 0

@@ -345,7 +345,7 @@ def make_pair_forces(features):
 
     @stage
     def pair_forces(heap, constants, scratch, thread, slab, h, evaluation):
-        current = heap.count[PARITY] % heap.pair.shape[0]
+        current = heap.counts[PARITY] % heap.pair.shape[0]
         room, n = heap.pair.shape[2], heap.particle.shape[0]
         pair, particle = heap.pair[current, slab].reshape(2 * room), heap.particle.reshape(4 * n)
         motion = heap.motion.reshape(MOTION * heap.motion.shape[0])

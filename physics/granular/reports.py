@@ -59,8 +59,8 @@ def make_report_pairs(features: HeapFeatures) -> Any:
 
     @stage
     def report_pairs(heap, constants, scratch, rows):
-        found, evaluation = 0, heap.count[EVALUATION]
-        current, room = heap.count[PARITY] % heap.pair.shape[0], heap.pair.shape[2]
+        found, evaluation = 0, heap.counts[EVALUATION]
+        current, room = heap.counts[PARITY] % heap.pair.shape[0], heap.pair.shape[2]
         particle = heap.particle.reshape(4 * heap.particle.shape[0])
         motion = heap.motion.reshape(MOTION * heap.motion.shape[0])
         sample = heap.particle[0, 3], heap.motion[0, INVERSE_MASS], heap.motion[0, WEIGHT]
@@ -98,13 +98,13 @@ def make_report_pairs(features: HeapFeatures) -> Any:
 def make_report_statics(features: HeapFeatures) -> Any:
     """Stage that appends the contacts with statics."""
     history, some = features.history, len(features.kinds) > 0
-    static_force = make_static_force(features) if some else None
+    static_force: Any = make_static_force(features) if some else None
 
     @stage
     def report_statics(heap, constants, rows, found):
         if some:
-            evaluation = heap.count[EVALUATION]
-            current, room = heap.count[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
+            evaluation = heap.counts[EVALUATION]
+            current, room = heap.counts[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
             for slab in range(SLABS):
                 for entry_of in range(heap.wall_count[current, slab]):
                     n, s = (
@@ -170,7 +170,7 @@ def contacts(
         states: [bodies] of DYNAMIC_STATE.
         names: of the scene's solids.
     """
-    current, walls = heap.count[PARITY] % len(heap.pair), heap.count[PARITY] % len(heap.wall)
+    current, walls = heap.counts[PARITY] % len(heap.pair), heap.counts[PARITY] % len(heap.wall)
     room = heap.pair_count[current].sum() + heap.wall_count[walls].sum()
     rows = np.zeros(int(room), ROW)
     rows = rows[: make_report(features)(heap, constants, scratch, states, rows)]

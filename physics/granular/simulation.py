@@ -190,7 +190,7 @@ class GranularSimulation:
         for w in np.flatnonzero(worlds):
             if status["diverged"][w] == 0:
                 refresh = bool(status["needs_refresh"][w] != 0)
-                bad = self._run_heap(w, h, steps, refresh)
+                bad = self._run_heap(int(w), h, steps, refresh)
                 status["time"][w] += int(self._scratch.result[STEPS]) * h
                 status["diverged"][w] = bad + 1
                 status["needs_refresh"][w] = 0
@@ -273,7 +273,7 @@ class GranularSimulation:
     @property
     def particles(self) -> tuple[Array, Array]:
         """Body [n] of each particle; and x y z in its frame and radius, [n, 4] in m."""
-        return np.repeat(np.arange(self.bodies), self._bodies.count), self._bodies.points
+        return np.repeat(np.arange(self.bodies), self._bodies.particles), self._bodies.points
 
     def coefficients(self, first: int, second: int) -> dict[str, float]:
         """Coefficients of the contacts of a body with another solid, in scene order.

@@ -4,6 +4,8 @@ Few particles touch a static, so they are computed one by one, when the forces o
 summed. Springs of contacts with statics are stored in the world frame.
 """
 
+from typing import Any
+
 from physics.collision.distances import core_distance
 from physics.compiler.jit import LANES, stage
 from physics.granular.coefficients import contact_coefficients
@@ -27,7 +29,7 @@ from physics.motion.vectors import cross
 def make_distance_of(kinds):
     """Formula for the distance from a surface of one of several kinds."""
     kind, distance = kinds[0], core_distance(kinds[0])
-    others = make_distance_of(kinds[1:]) if len(kinds) > 1 else None
+    others: Any = make_distance_of(kinds[1:]) if len(kinds) > 1 else None
     if others is None:
 
         @stage
@@ -76,12 +78,12 @@ def make_static_distance(features):
 def make_find_statics(features):
     """Stage that lists the particles of a slab of bodies that are near a static."""
     history, some = features.history, len(features.kinds) > 0
-    static_distance = make_static_distance(features) if some else None
+    static_distance: Any = make_static_distance(features) if some else None
 
     @stage
     def find_statics(heap, constants, scratch, thread, slab, first_body, last_body, evaluation):
         lists, room = heap.wall.shape[0], heap.wall.shape[2]
-        old, new = heap.count[PARITY] % lists, (heap.count[PARITY] + 1) % lists
+        old, new = heap.counts[PARITY] % lists, (heap.counts[PARITY] + 1) % lists
         total = 0
         if some:
             skin = heap.scale[SKIN]
@@ -184,13 +186,13 @@ def make_static_forces(features):
     It continues in the slab's list at `next`, and returns where the next group's entries begin.
     """
     history, some = features.history, len(features.kinds) > 0
-    static_force = make_static_force(features) if some else None
-    static_distance = make_static_distance(features) if some else None
+    static_force: Any = make_static_force(features) if some else None
+    static_distance: Any = make_static_distance(features) if some else None
 
     @stage
     def static_forces(heap, constants, slab, next_entry, first_body, lanes, solid, h, evaluation):
         if some:
-            current, room = heap.count[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
+            current, room = heap.counts[PARITY] % heap.wall.shape[0], heap.wall.shape[2]
             count = heap.wall_count[current, slab]
             wall = heap.wall[current, slab]
             while next_entry < count:

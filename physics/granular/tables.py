@@ -79,7 +79,7 @@ LEVEL = np.dtype(
     align=True,
 )
 
-# elements of Heap.count
+# elements of Heap.counts
 # force evaluations that contacts remember; which of two lists is valid; lists since the bodies were
 # sorted; steps since the list was made; 0: the list must be made again
 EVALUATION, PARITY, REBUILDS, SINCE, VALID, COUNTS = range(6)
@@ -133,7 +133,7 @@ class Heap(NamedTuple):
         wall_shear: [lists, SLABS * room, 4] N, in the world frame, and the evaluation.
         force_range: [SLABS, 3] first and last place on which a slab's pairs act, and where these
             begin in `Scratch.force`.
-        count: [COUNTS] see EVALUATION.
+        counts: [COUNTS] see EVALUATION.
         scale: [SCALES] see SKIN.
     """
 
@@ -157,7 +157,7 @@ class Heap(NamedTuple):
     wall_range: Array
     wall_shear: Array
     force_range: Array
-    count: Array
+    counts: Array
     scale: Array
 
     @property

@@ -37,8 +37,8 @@ def heap_scene(
     draw = np.random.default_rng(seed)
     count, pitch = len(shapes), 2.2 * max(shape.reach for shape in set(shapes))
     index = np.arange(count)
-    lattice = np.stack([index % columns, index // columns % columns, index // columns**2], axis=-1)
-    lattice = lattice + 0.5 + draw.uniform(-0.5, 0.5, (count, 3)) * _JITTER / 2.2
+    cell = np.stack([index % columns, index // columns % columns, index // columns**2], axis=-1)
+    lattice = cell + 0.5 + draw.uniform(-0.5, 0.5, (count, 3)) * _JITTER / 2.2
     width = columns * pitch
     places = pitch * lattice - np.array([width, width, 0.0]) / 2.0
     turns = draw.normal(size=(count, 4))

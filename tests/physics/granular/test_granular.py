@@ -23,9 +23,12 @@ from physics.step.simulation import Simulation
 R = 0.02
 STEP = 5e-4
 FIDELITIES = {
-    name: Fidelity(damping="dashpot", friction=name, substep=STEP) for name in ("viscous", "coulomb")
+    name: Fidelity(damping="dashpot", friction=name, substep=STEP)
+    for name in ("viscous", "coulomb")
 }
 ROUGH = Material(friction=0.6, restitution=0.3)
+ROLLS = Material(rolling_resistance=0.1)
+BALL_AND_RING = (Body(Sphere(1)), Body(torus(1.0), position=(5, 0, 0)))
 
 
 def simulation(scene, friction="coulomb", threads=1, count=1):
@@ -127,7 +130,9 @@ def test_no_contact_is_lost(seed):
     bodies = [Body(Sphere(r), position=tuple(draw.uniform(-0.5, 0.5, 3))) for r in radii]
     rod = chess_piece(0.02)
     bodies += [
-        Body(rod, position=tuple(draw.uniform(-0.5, 0.5, 3)), orientation=tuple(draw.normal(size=4)))
+        Body(
+            rod, position=tuple(draw.uniform(-0.5, 0.5, 3)), orientation=tuple(draw.normal(size=4))
+        )
         for _ in range(120)
     ]
     heap = simulation(Scene(bodies=bodies))
@@ -258,17 +263,18 @@ def test_the_readout_shows_the_state():
 @pytest.mark.parametrize(
     ("scene", "fidelity", "reason"),
     [
-        (Scene(bodies=[Body(Box((1, 1, 1)))]), {}, r"bodies\[0\]\.shape must be Particles or Sphere, got Box"),
-        (Scene(bodies=[Body(Sphere(1))], drives=[Drive(Sphere(1), mass=1.0, force_limit=9.0, position=(0, 0, 3))]), {}, "drives must be empty, got 1"),
-        (Scene(bodies=[Body(Sphere(1), group=2)]), {}, r"bodies\[0\] must have the default group"),
-        (Scene(bodies=[Body(Sphere(1), material=Material(rolling_resistance=0.1))]), {}, "rolling_resistance must be 0, got 0.1"),
-        (Scene(bodies=[Body(Particles([[0, 0, 0]], 1.0))]), {}, "must be a Sphere instead"),
-        (Scene(bodies=[Body(Sphere(1))]), {"damping": "hunt_crossley"}, "damping must be 'dashpot', got 'hunt_crossley'"),
-        (Scene(bodies=[Body(Sphere(1))]), {"integrator": "rk4"}, "integrator must be 'midpoint' or 'euler', got 'rk4'"),
-        (Scene(bodies=[Body(Sphere(1)), Body(torus(1.0), position=(5, 0, 0))]), {"geometry": "particle"}, "geometry must be 'shape'"),
+        ({"bodies": [Body(Box((1, 1, 1)))]}, {}, "must be Particles or Sphere, got Box"),
+        ({"drives": [Drive(Sphere(1), mass=1.0, force_limit=9.0)]}, {}, "drives must be empty"),
+        ({"bodies": [Body(Sphere(1), group=2)]}, {}, r"bodies\[0\] must have the default group"),
+        ({"bodies": [Body(Sphere(1), material=ROLLS)]}, {}, "resistance must be 0, got 0.1"),
+        ({"bodies": [Body(Particles([[0, 0, 0]], 1.0))]}, {}, "must be a Sphere instead"),
+        ({}, {"damping": "hunt_crossley"}, "damping must be 'dashpot', got 'hunt_crossley'"),
+        ({}, {"integrator": "rk4"}, "integrator must be 'midpoint' or 'euler', got 'rk4'"),
+        ({"bodies": BALL_AND_RING}, {"geometry": "particle"}, "geometry must be 'shape'"),
     ],
 )  # fmt: skip
 def test_what_is_not_supported_is_named(scene, fidelity, reason):
+    scene = Scene(**{"bodies": [Body(Sphere(1), position=(5, 0, 0))], **scene})
     asked = replace(FIDELITIES["viscous"], **fidelity)
     with pytest.raises(ValueError, match=reason):
         GranularSimulation(scene, asked, 1, 1)
