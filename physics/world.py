@@ -294,6 +294,11 @@ class World:
                 is unstable or a body sinks. The message names the solid that limits the substep and
                 the largest safe one.
         """
+        if isinstance(self._queries, CrowdQueries):
+            raise ValueError(
+                f"check_parameters is for worlds side by side; a world of {len(self.scene.bodies)} "
+                "bodies has no per-world parameters: build one with per_world_parameters=True"
+            )
         low, high = check_ranges(ranges, Parameters.of(self.scene))
         if not self._allow_unstable:
             self._limits.check_range(low, high)

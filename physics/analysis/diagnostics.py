@@ -10,6 +10,7 @@ from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry
 from physics.impulse.contact_rows import make_contact_rows
+from physics.model.contacts import Contacts
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, State
@@ -22,29 +23,6 @@ from physics.spring.contact_loop import REPORT
 from physics.spring.contacts import make_half_pair
 
 Array = np.ndarray
-
-
-class Contacts(NamedTuple):
-    """Touching points of one world, n of them, in the world frame.
-
-    Attributes:
-        pair: [n, 2] indices of the two solids: bodies, then drives, then statics, in scene order.
-        names: [n] names of the two solids, (first, second).
-        point: [n, 3] m, within the overlap, see `contact_point`.
-        normal: [n, 3] unit vector from the second solid to the first.
-        penetration: [n] m; negative where solids collided up to half a step before they touch.
-        force: [n, 3] N on the first solid; the second feels the opposite. A collision of the
-            impulse law counts as its mean over the substep.
-        first_touch: [n] s, when the two first touched since their state was last set.
-    """
-
-    pair: Array
-    names: tuple[tuple[str, str], ...]
-    point: Array
-    normal: Array
-    penetration: Array
-    force: Array
-    first_touch: Array
 
 
 class Report(NamedTuple):

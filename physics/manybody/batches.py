@@ -123,12 +123,12 @@ def gather_velocity(frame, places, solid):
 
 
 @stage
-def mark_lanes(lane, places):
-    """Lanes that hold a pair are active, and remember what they do."""
+def mark_lanes(lane, places, remembers):
+    """Lanes that hold a pair are active, and remember what they do unless a query asks."""
     for i in range(LANES):
         present = 1 if places[i] >= 0 else 0
         lane.active[i] = present
-        lane.updates_memory[i] = present
+        lane.updates_memory[i] = present if remembers else 0
         lane.world[i] = present - 1
 
 
@@ -175,7 +175,7 @@ def make_find_candidates(features):
             exhausted += spend_skin(owner, surface, half_pair, live, least)
         if exhausted == 0 and not has_candidates(workspace):
             return False
-        mark_lanes(workspace.lane[0], first)
+        mark_lanes(workspace.lane[0], first, True)
         gather_pose(crowd.frame, first, one)
         gather_pose(crowd.frame, second, two)
         if compound:
@@ -197,7 +197,7 @@ def make_batch_forces(features):
 
     @sequence
     def batch_forces(
-        all_model, state, workspace, crowd, pairs, b, h, elapsed, starts_collision_step
+        all_model, state, workspace, crowd, pairs, b, h, elapsed, starts_collision_step, remembers
     ):
         kind = crowd.pair_kind[pairs.kind[b]]
         model = model_of(all_model, kind)
@@ -207,10 +207,12 @@ def make_batch_forces(features):
         wrench = pairs.wrench[b]
         if touching:
             one, two = workspace.solid[0], workspace.solid[1]
+            mark_lanes(workspace.lane[0], pairs.first[b], remembers)
             gather_velocity(crowd.frame, pairs.first[b], one)
             gather_velocity(crowd.frame, pairs.second[b], two)
             contacts(model, own, mine, 0, h, h, elapsed)
-            record_first_touch(mine, state.world[0].time + elapsed)
+            if remembers:
+                record_first_touch(mine, state.world[0].time + elapsed)
             for i in range(LANES):
                 for c in range(3):
                     wrench[i, c] = one.force[c, i]

@@ -98,13 +98,13 @@ def make_prepare_batch(features):
     contact_rows = make_contact_rows(features)
 
     @sequence
-    def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h):
+    def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h, remembers):
         kind = crowd.pair_kind[pairs.kind[b]]
         model = model_of(all_model, kind)
         first_row, row_count = pairs.first_row[b], pairs.row_count[b]
         mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
         own = state_of(state, pairs, kind, b)
-        mark_lanes(workspace.lane[0], pairs.first[b])
+        mark_lanes(workspace.lane[0], pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], workspace.solid[0])
         gather_pose(crowd.frame, pairs.second[b], workspace.solid[1])
         gather_speeds(crowd, pairs, b, workspace)
@@ -342,14 +342,14 @@ def make_finish_batch(features):
     store_forces = make_store_forces(features)
 
     @sequence
-    def finish_batch(all_model, state, workspace, rows, crowd, pairs, b, h, elapsed):
+    def finish_batch(all_model, state, workspace, rows, crowd, pairs, b, h, elapsed, remembers):
         kind = crowd.pair_kind[pairs.kind[b]]
         model = model_of(all_model, kind)
         first_row, row_count = pairs.first_row[b], pairs.row_count[b]
         mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
         own = state_of(state, pairs, kind, b)
         one, two, lane = workspace.solid[0], workspace.solid[1], workspace.lane[0]
-        mark_lanes(lane, pairs.first[b])
+        mark_lanes(lane, pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], one)
         gather_pose(crowd.frame, pairs.second[b], two)
         gather_velocity(crowd.frame, pairs.first[b], one)
@@ -364,8 +364,11 @@ def make_finish_batch(features):
             candidate = own.candidate[0, first : first + live.slots]
             pair = operands_of(model, mine, k)
             store_forces(pair, candidate, lane.updates_memory, h, normal_force)
-            update_previous(live.previous_normal_force, normal_force, lane.updates_memory, True)
-        record_first_touch(mine, state.world[0].time + elapsed)
+            update_previous(
+                live.previous_normal_force, normal_force, lane.updates_memory, remembers
+            )
+        if remembers:
+            record_first_touch(mine, state.world[0].time + elapsed)
         for i in range(LANES):
             for c in range(3):
                 pairs.wrench[b, i, c] = one.force[c, i]

@@ -1,14 +1,19 @@
 """Substeps of one world of many bodies with the impulse law, by several threads.
 
-The impulses of `impulse.solver`, in the same order, but swept colour by colour: the pairs of one
-colour share no body, so they are solved at once, by any number of threads, with the same result.
-Those that found no colour are solved one after the other.
+The steps of `impulse.solver`, but swept colour by colour: the pairs of one colour share no body, so
+they are solved at once, by any number of threads, with the same result. Those that found no colour
+are solved one after the other.
+
+Instantaneous collisions are local: only pairs with a body whose velocity a collision has changed
+take part, while in worlds side by side all contacts of a world do. The energy that restitution may
+return is that of the whole world's collisions in a substep, with the largest restitution among
+them.
 """
 
 import math
 from functools import cache
 
-from physics.compiler.barrier import wait
+from physics.compiler.atomics import wait_for_all
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry, sequence, stage
 from physics.impulse.restitution import MAX_SWEEPS
@@ -39,6 +44,7 @@ from physics.manybody.impulse_batches import (
 from physics.manybody.spring_steps import BATCHES, REFRESH, RESUME, STEP
 from physics.manybody.tables import MOST_COLOURS
 from physics.model.features import EULER, Features, cached_by_features
+from physics.model.state import STARTS_ANEW
 
 # what a call continues with, besides those of the spring law: there is room for all contact rows
 ROWS = 3
@@ -51,6 +57,20 @@ def of_thread(first, last, thread, threads):
     """Where the part of a thread begins and ends."""
     count = last - first
     return first + count * thread // threads, first + count * (thread + 1) // threads
+
+
+@stage
+def part_of_colour(crowd, colour, thread, threads):
+    """Which entries of `Crowd.order` of a colour a thread works on, and whether there are any.
+
+    Pairs without a colour are left to the first thread.
+    """
+    begin, end = crowd.colour_first[colour], crowd.colour_first[colour + 1]
+    if colour < MOST_COLOURS:
+        first, last = of_thread(begin, end, thread, threads)
+    else:
+        first, last = begin, end if thread == 0 else begin
+    return first, last, end > begin
 
 
 @stage
@@ -83,9 +103,9 @@ def all_work(crowd, pairs, barrier, thread, threads, shared):
                     work += pairs.impact_work[b, i]
                     pairs.impact_work[b, i] = 0.0
         shared[0, 4] = work
-    wait(barrier, threads)
+    wait_for_all(barrier, 0, threads)
     work = shared[0, 4]
-    wait(barrier, threads)
+    wait_for_all(barrier, 0, threads)
     return work
 
 
@@ -110,24 +130,20 @@ def make_collide(features):
                     if pairs.colliding[b, i] != 0:
                         stir(crowd, pairs.first[b, i], stamp)
                         stir(crowd, pairs.second[b, i], stamp)
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         found = total(shared, threads, 2)
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         return found
 
     @sequence
     def push_out(model, workspace, rows, crowd, pairs, since, barrier, thread, threads):
         for colour in range(MOST_COLOURS + 1):
-            first, last = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-            if colour < MOST_COLOURS:
-                first, last = of_thread(first, last, thread, threads)
-            elif thread > 0:
-                last = first
+            first, last, used = part_of_colour(crowd, colour, thread, threads)
             for n in range(first, last):
                 if pairs.busy[crowd.order[n]] != 0:
                     push_out_batch(model, workspace, rows, crowd, pairs, crowd.order[n], since)
-            if crowd.colour_first[colour + 1] > crowd.colour_first[colour]:
-                wait(barrier, threads)
+            if used:
+                wait_for_all(barrier, 0, threads)
 
     @sequence
     def solve(
@@ -138,11 +154,7 @@ def make_collide(features):
         for _ in range(MAX_SWEEPS):
             moved = 0
             for colour in range(MOST_COLOURS + 1):
-                first, last = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-                if colour < MOST_COLOURS:
-                    first, last = of_thread(first, last, thread, threads)
-                elif thread > 0:
-                    last = first
+                first, last, used = part_of_colour(crowd, colour, thread, threads)
                 for n in range(first, last):
                     b = crowd.order[n]
                     if pairs.busy[b] != 0:
@@ -150,13 +162,13 @@ def make_collide(features):
                             model, workspace, rows, crowd, pairs, b, stamp, stamp + 1, after,
                             fastest,
                         )  # fmt: skip
-                if crowd.colour_first[colour + 1] > crowd.colour_first[colour]:
-                    wait(barrier, threads)
+                if used:
+                    wait_for_all(barrier, 0, threads)
             stamp += 1
             shared[thread, 3] = moved
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             moves = total(shared, threads, 3)
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             if moves == 0.0:
                 break
         return stamp
@@ -166,19 +178,15 @@ def make_collide(features):
         model, workspace, rows, crowd, pairs, rescale, scale, barrier, thread, threads, stamp
     ):
         for colour in range(MOST_COLOURS + 1):
-            first, last = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-            if colour < MOST_COLOURS:
-                first, last = of_thread(first, last, thread, threads)
-            elif thread > 0:
-                last = first
+            first, last, used = part_of_colour(crowd, colour, thread, threads)
             for n in range(first, last):
                 b = crowd.order[n]
                 if pairs.busy[b] != 0:
                     restitution_batch(
                         model, workspace, rows, crowd, pairs, b, rescale, scale, stamp
                     )
-            if crowd.colour_first[colour + 1] > crowd.colour_first[colour]:
-                wait(barrier, threads)
+            if used:
+                wait_for_all(barrier, 0, threads)
 
     @sequence
     def collide(
@@ -196,7 +204,7 @@ def make_collide(features):
             if attempt == 0:
                 push_out(model, workspace, rows, crowd, pairs, stamp, barrier, thread, threads)
         fastest, e = largest(shared, threads, 0), largest(shared, threads, 1)
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         for after in range(2):
             stamp = solve(
                 model, workspace, rows, crowd, pairs, fastest, after == 1, barrier, thread,
@@ -218,7 +226,7 @@ def make_collide(features):
             b = crowd.order[n]
             if n // BATCHES % threads == thread and pairs.busy[b] != 0:
                 book_impacts(model, workspace, rows, crowd, pairs, b, refresh)
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         return stamp, True
 
     return collide
@@ -232,32 +240,24 @@ def make_sweeps(features):
     @sequence
     def sweep_all(model, workspace, rows, crowd, pairs, h, soft, barrier, thread, threads):
         for colour in range(MOST_COLOURS + 1):
-            first, last = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-            if colour < MOST_COLOURS:
-                first, last = of_thread(first, last, thread, threads)
-            elif thread > 0:
-                last = first
+            first, last, used = part_of_colour(crowd, colour, thread, threads)
             for n in range(first, last):
                 b = crowd.order[n]
                 if pairs.busy[b] != 0:
                     sweep_batch(model, workspace, rows, crowd, pairs, b, h, soft)
-            if crowd.colour_first[colour + 1] > crowd.colour_first[colour]:
-                wait(barrier, threads)
+            if used:
+                wait_for_all(barrier, 0, threads)
 
     @sequence
     def warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads):
         for colour in range(MOST_COLOURS + 1):
-            first, last = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-            if colour < MOST_COLOURS:
-                first, last = of_thread(first, last, thread, threads)
-            elif thread > 0:
-                last = first
+            first, last, used = part_of_colour(crowd, colour, thread, threads)
             for n in range(first, last):
                 b = crowd.order[n]
                 if pairs.busy[b] != 0:
                     warm_batch(model, workspace, rows, crowd, pairs, b)
-            if crowd.colour_first[colour + 1] > crowd.colour_first[colour]:
-                wait(barrier, threads)
+            if used:
+                wait_for_all(barrier, 0, threads)
 
     return sweep_all, warm_all
 
@@ -298,7 +298,7 @@ def make_impulse_steps(features: Features):
         blocks, batches = crowd.solid.shape[0], crowd.order.shape[0]
         first, last = of_thread(0, blocks, thread, threads)
         done, phase, stamp = progress[0], progress[1], progress[4]
-        wait(barrier, threads)  # before any thread writes the progress
+        wait_for_all(barrier, 0, threads)  # before any thread writes the progress
         while done < substeps or phase != STEP:
             refresh = phase == REFRESH or (phase == ROWS and progress[5] != 0)
             if phase == STEP:
@@ -306,9 +306,9 @@ def make_impulse_steps(features: Features):
                 for m in range(first, last):
                     far += move_block(model, workspace, crowd, m, before * h, h)
                 shared[thread, 5] = far
-                wait(barrier, threads)
+                wait_for_all(barrier, 0, threads)
                 far = total(shared, threads, 5)
-                wait(barrier, threads)
+                wait_for_all(barrier, 0, threads)
                 if far > 0:
                     if thread == 0:
                         progress[0], progress[1], progress[2] = done, RESUME, 1
@@ -317,9 +317,10 @@ def make_impulse_steps(features: Features):
             elif phase == REFRESH:
                 for m in range(first, last):
                     place_block(model, workspace, crowd, m)
-                wait(barrier, threads)
+                wait_for_all(barrier, 0, threads)
             span, drifted = (before * h, 0.0) if refresh else (h, h)
             elapsed = done * h + drifted
+            remembers = not refresh or progress[6] == STARTS_ANEW
             starts = not refresh and done > 0 and done % collision_substeps == 0
             if phase != ROWS:
                 for n in range(batches):
@@ -328,12 +329,12 @@ def make_impulse_steps(features: Features):
             for m in range(first, last):
                 write_tensors(crowd, m)
                 known_forces(model, workspace, crowd, m)
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             if thread == 0:
                 progress[3] = place_rows(crowd, pairs)
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             if progress[3] > rows.shape[0]:
-                wait(barrier, threads)
+                wait_for_all(barrier, 0, threads)
                 if thread == 0:
                     progress[0], progress[1], progress[2] = done, ROWS, 2
                     progress[4], progress[5] = stamp, 1 if refresh else 0
@@ -341,12 +342,12 @@ def make_impulse_steps(features: Features):
             for n in range(batches):
                 b = crowd.order[n]
                 if n // BATCHES % threads == thread and pairs.busy[b] != 0:
-                    prepare_batch(model, state, workspace, rows, crowd, pairs, b, span)
-            wait(barrier, threads)
+                    prepare_batch(model, state, workspace, rows, crowd, pairs, b, span, remembers)
+            wait_for_all(barrier, 0, threads)
             # velocities are half a step old; bodies collide with the present ones
             for m in range(first, last):
                 change_velocities(crowd, m, lag * drifted)
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             stamp, collided = collide(
                 model, workspace, rows, crowd, pairs, span, drifted == 0.0, barrier, thread,
                 threads, shared, stamp,
@@ -356,12 +357,12 @@ def make_impulse_steps(features: Features):
                     solid = crowd.solid[m]
                     add_contacts(crowd, pairs, m, solid.momentum, solid.angular_momentum)
                 change_velocities(crowd, m, -lag * drifted)
-            wait(barrier, threads)
+            wait_for_all(barrier, 0, threads)
             for soft in range(2):
                 if soft == 1:
                     for m in range(first, last):
                         change_velocities(crowd, m, span)
-                    wait(barrier, threads)
+                    wait_for_all(barrier, 0, threads)
                     warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads)
                 sweep_all(
                     model, workspace, rows, crowd, pairs, span, soft == 1, barrier, thread, threads
@@ -369,8 +370,10 @@ def make_impulse_steps(features: Features):
             for n in range(batches):
                 b = crowd.order[n]
                 if n // BATCHES % threads == thread and pairs.busy[b] != 0:
-                    finish_batch(model, state, workspace, rows, crowd, pairs, b, span, elapsed)
-            wait(barrier, threads)
+                    finish_batch(
+                        model, state, workspace, rows, crowd, pairs, b, span, elapsed, remembers
+                    )
+            wait_for_all(barrier, 0, threads)
             for m in range(first, last):
                 solid = crowd.solid[m]
                 add_contacts(crowd, pairs, m, solid.force, solid.torque)
@@ -379,7 +382,7 @@ def make_impulse_steps(features: Features):
                     kick(own, block_workspace(workspace, crowd, m), 0.5 * h)
             done += 0 if refresh else 1
             phase = STEP
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         if thread == 0:
             progress[0], progress[1], progress[2], progress[4] = done, STEP, 0, stamp
 

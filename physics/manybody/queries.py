@@ -37,6 +37,7 @@ class CrowdQueries:
     def _touching(self, world: int) -> Array:
         """Rows of TOUCH of a world."""
         simulation = self._simulation
+        simulation.place(world)
         crowd, pairs = simulation.arrays(world)
         slots = int(simulation.kinds.pair_kind["slot_count"].max(initial=0))
         if simulation.state.world["diverged"][world]:
@@ -93,7 +94,7 @@ class CrowdQueries:
     def normal_force(self, first: int, second: int) -> Array:
         """[count] N between two solids in the last step; 0 where they aren't near each other."""
         return np.array([
-            sum(float(row["previous_normal_force"][lane]) for row in rows)
+            sum(float(row["previous_normal_force"][lane]) for row in rows if row["count"][lane] > 0)
             for rows, lane in self._of_pair(first, second)
         ])  # fmt: skip
 
@@ -155,10 +156,10 @@ class CrowdQueries:
 
         def load(h: float) -> float:
             nonlocal x  # a good start for the next step
-            size = 0.0
+            size, loads = 0.0, system.loads(h)
             for _ in range(_MOST_ITERATIONS):
                 x = x / np.sqrt(system.product(x, x))
-                y = system.accelerate(h, x)
+                y = system.accelerate(loads, x)
                 new = system.product(x, y)
                 x = y
                 if abs(new - size) <= _CONVERGED * new:
@@ -176,7 +177,8 @@ class _Contacts:
         bodies = simulation.bodies
         dynamic = simulation.state.dynamic[world]
         self._rows, self._features = found, simulation.features
-        self._half_pair = simulation.kinds.model.half_pair[found["half_pair"]]
+        kinds, self._of_kind = np.unique(found["half_pair"], return_inverse=True)
+        self._kinds = simulation.kinds.model.half_pair[kinds]
         self._ends = [(found["owner"], 1.0), (found["surface"], -1.0)]
         self._bodies = bodies
         self._arm = [
@@ -194,16 +196,17 @@ class _Contacts:
         moved = np.sum(x[:, :3] * y[:, :3] / self._inverse_mass)
         return float(moved + np.einsum("bi,bij,bj->", x[:, 3:], self._inertia, y[:, 3:]))
 
-    def accelerate(self, h: float, x: Array) -> Array:
+    def loads(self, h: float) -> tuple[Array, Array, Array]:
+        """Of each contact, along the normal and across it in kg, and against rotation in kg m^2."""
+        dashpot, viscous = self._features.dashpot, self._features.viscous
+        along = np.array([stability.normal_load(row, dashpot, h) for row in self._kinds])
+        across = np.array([stability.shear_load(row, viscous, h) for row in self._kinds])
+        twist = np.array([stability.twist_load(row, h) for row in self._kinds])
+        return along[self._of_kind], across[self._of_kind], twist[self._of_kind]
+
+    def accelerate(self, loads: tuple[Array, Array, Array], x: Array) -> Array:
         """M^-1 A x, see `analysis.stability`."""
-        along, across, twist = (
-            np.array([of(row, flag, h) for row in self._kinds()])[self._index()]
-            for of, flag in (
-                (stability.normal_load, self._features.dashpot),
-                (stability.shear_load, self._features.viscous),
-                (lambda row, _, h: stability.twist_load(row, h), False),
-            )
-        )
+        along, across, twist = loads
         weight, normal = self._rows["weight"], self._rows["normal"]
         moved, turned = np.zeros_like(normal), np.zeros_like(normal)
         for (place, sign), arm in zip(self._ends, self._arm, strict=True):
@@ -224,11 +227,3 @@ class _Contacts:
         out[:, :3] *= self._inverse_mass
         out[:, 3:] = np.einsum("bij,bj->bi", self._inverse, out[:, 3:])
         return out
-
-    def _kinds(self) -> Array:
-        """Rows of the half-pairs that occur."""
-        return self._half_pair[np.unique(self._rows["half_pair"], return_index=True)[1]]
-
-    def _index(self) -> Array:
-        """Of each contact, the row of `_kinds`."""
-        return np.unique(self._rows["half_pair"], return_inverse=True)[1]

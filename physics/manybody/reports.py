@@ -90,15 +90,13 @@ def make_touching(features: Features) -> Any:
             own = state_of(state, pairs, kind, b)
             if not has_candidates(mine):
                 continue
-            mark_lanes(workspace.lane[0], pairs.first[b])
+            mark_lanes(workspace.lane[0], pairs.first[b], False)
             for side in range(2):
                 places = pairs.first[b] if side == 0 else pairs.second[b]
                 gather_pose(crowd.frame, places, workspace.solid[side])
                 gather_velocity(crowd.frame, places, workspace.solid[side])
             if impulse:
                 gather_tensors(crowd, pairs, b, workspace)
-                for i in range(LANES):
-                    workspace.lane[0].updates_memory[i] = 0
             compound_frames(model, mine)
             for k in range(mine.half_pair.shape[0]):
                 live, constants = mine.half_pair[k], model.half_pair[k]

@@ -1,18 +1,16 @@
 """Simulation of worlds of many bodies: pairs of bodies side by side in vector lanes, not worlds."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
-from physics.compiler.barrier import new_barrier
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.manybody.impulse_steps import SHARED, make_impulse_steps
 from physics.manybody.kinds import Kinds, find_kinds
 from physics.manybody.pair_lists import PairLists
-from physics.manybody.spring_steps import REFRESH, STEP, make_spring_steps
+from physics.manybody.spring_steps import FIRST_COUNT, REFRESH, STEP, make_spring_steps
 from physics.manybody.tables import FRAME_WIDTH, MOST_COLOURS, POSITION, ROTATION, Crowd, Pairs
-from physics.manybody.transfer import make_load_bodies, make_store_bodies
+from physics.manybody.transfer import make_load_bodies, make_place_bodies, make_store_bodies
 from physics.model.build import dynamic_rows, per_world_dtype
 from physics.model.coefficients import dynamic_columns
 from physics.model.features import Features
@@ -28,6 +26,7 @@ from physics.scene.solids import Ground
 from physics.scene.validation import IDENTITY
 from physics.step.readout import make_readout
 from physics.step.simulation import Simulation
+from physics.step.threads import run_together
 
 Array = np.ndarray
 
@@ -35,8 +34,6 @@ Array = np.ndarray
 MANY = 33
 # batches of pairs for which a second thread pays
 _FEWEST_BATCHES = 32
-
-_pools: dict[int, ThreadPoolExecutor] = {}
 
 
 def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
@@ -80,7 +77,7 @@ class CrowdSimulation(Simulation):
     def _find_kernels(self) -> None:
         impulse = self.fidelity.law == "impulse"
         make: Any = make_impulse_steps if impulse else make_spring_steps
-        self._advance, self._compiled = make(self.features), False
+        self._advance, self._compiled = make(self.kinds.features), False
         self._load, self._store = make_load_bodies(), make_store_bodies()
         self._readout = make_readout(self.features)
 
@@ -142,25 +139,36 @@ class CrowdSimulation(Simulation):
         return well
 
     def _run_world(self, w: int, h: float, substeps: int) -> bool:
-        """Advances one world; returns whether it went well."""
-        status, lists = self.state.world[w : w + 1], self._lists[w]
-        if status["diverged"][0]:
+        """Advances one world; returns whether it went well.
+
+        If a call is interrupted, the world is as it was before it, and its contacts begin afresh.
+        """
+        if self.state.world["diverged"][w]:
             return False
-        crowd = self._worlds[w][0]
+        try:
+            return self._run_substeps(w, h, substeps)
+        except BaseException:
+            self.forget(np.arange(self.count) == w)
+            raise
+
+    def _run_substeps(self, w: int, h: float, substeps: int) -> bool:
+        status, lists, crowd = self.state.world[w : w + 1], self._lists[w], self._worlds[w][0]
         if self.features.wrench:
             wrench = np.zeros((crowd.motion.size, 6))
             wrench[: self.bodies] = self.state.wrench[w]
             crowd = crowd._replace(wrench=wrench)
         self._load(self.state.dynamic, w, crowd)
-        refresh = int(status["needs_refresh"][0])
-        progress = np.zeros(8 + self.threads, np.int64)
+        mark = int(status["needs_refresh"][0])
+        status["overflow"] = 0
+        progress = np.zeros(FIRST_COUNT + self.threads, np.int64)
+        progress[1], progress[6] = REFRESH if mark else STEP, mark
         crowd.stirred[...] = 0
-        progress[1] = REFRESH if refresh else STEP
-        if refresh == STARTS_ANEW:
+        if mark == STARTS_ANEW:
             lists.clear()
-            crowd = self._search(w, crowd, at_rest=True)
+            self._place(crowd)
+            crowd = lists.search(crowd)
         finite = True
-        while True:
+        while finite:
             self._call(crowd, lists, w, h, substeps, progress)
             if progress[2] == 0:
                 break
@@ -169,33 +177,28 @@ class CrowdSimulation(Simulation):
                 self._rows = aligned_zeros(needed + needed // 4, CONTACT_ROW)
                 continue
             finite = bool(np.isfinite(crowd.frame).all())
-            if not finite:
-                break
-            crowd = self._search(w, crowd, at_rest=False)
-        done = int(progress[0])
+            if finite:
+                crowd = lists.search(crowd)
         diverged = self._store(self.state.dynamic, w, crowd, self.bodies)
-        status["time"] += done * h
+        if not finite and diverged == 0:
+            diverged = 1 + int(np.argmin(np.isfinite(crowd.frame).all(axis=1)))
+        status["time"] += int(progress[0]) * h
         status["needs_refresh"] = 0
         status["diverged"] = diverged
         self._worlds[w][0] = crowd
-        return diverged == 0
+        return diverged == 0 and not status["overflow"][0]
 
-    def _search(self, w: int, crowd: Crowd, at_rest: bool) -> Crowd:
-        """The world with its near pairs found again."""
-        if at_rest:
-            self._place(crowd)
-        return self._lists[w].search(crowd)
+    def _place(self, crowd: Crowd) -> None:
+        """Writes the frames of bodies at their present state."""
+        if not self._idle:
+            self._idle.append(self.working_memory())
+        make_place_bodies(self.kinds.features)(self.kinds.model, self._idle[0], crowd)
 
-    @staticmethod
-    def _place(crowd: Crowd) -> None:
-        """Writes the poses of bodies whose state was set from outside."""
-        solid, places = crowd.solid, crowd.motion.size
-        position = np.moveaxis(solid["position"], -1, 1).reshape(places, 3)
-        orientation = np.moveaxis(solid["orientation"], -1, 1).reshape(places, 4)
-        crowd.frame[:places] = 0.0
-        crowd.frame[:places, POSITION : POSITION + 3] = position
-        rotations = rotation_matrix(orientation).reshape(places, 9)
-        crowd.frame[:places, ROTATION : ROTATION + 9] = rotations
+    def place(self, world: int) -> None:
+        """Brings the frames of a world's bodies to its present state, for queries."""
+        crowd = self._worlds[world][0]
+        self._load(self.state.dynamic, world, crowd)
+        self._place(crowd)
 
     def _call(
         self, crowd: Crowd, lists: PairLists, w: int, h: float, substeps: int, progress: Array
@@ -205,7 +208,7 @@ class CrowdSimulation(Simulation):
         while len(self._idle) < threads:
             self._idle.append(self.working_memory())
         state = self.state._replace(world=self.state.world[w : w + 1])
-        barrier = new_barrier()
+        barrier = np.zeros(SHARED, np.int64)
 
         impulse = self.fidelity.law == "impulse"
         shared = np.zeros((threads, SHARED))
@@ -220,13 +223,7 @@ class CrowdSimulation(Simulation):
         if not self._compiled:  # by one thread, without a step: the others can't wait for it
             run(0, 1, 0, np.zeros_like(progress))
             self._compiled = True
-        if threads > 1 and threads not in _pools:
-            _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="bodies")
-        arguments = threads, substeps, progress
-        others = [_pools[threads].submit(run, n, *arguments) for n in range(1, threads)]
-        run(0, *arguments)
-        for other in others:
-            other.result()
+        run_together(lambda n: run(n, threads, substeps, progress), threads)
 
     @property
     def hidden_nbytes(self) -> int:
@@ -242,6 +239,13 @@ class CrowdSimulation(Simulation):
             (one[0].motion.copy(), one[0].margin.copy(), lists.saved())
             for one, lists in zip(self._worlds, self._lists, strict=True)
         ]
+
+    def _compile_wrenches(self) -> None:
+        """Adds the state of forces from the user, unless it is there; kernels need nothing new."""
+        if not self.features.wrench:
+            self.features = self.features._replace(wrench=True)
+            rows = np.zeros((self.count, self.bodies, 6))
+            self.state = self.state._replace(wrench=rows)
 
     def restore(self, saved: Any) -> None:
         """Returns to what `saved` gave."""

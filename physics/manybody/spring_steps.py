@@ -7,7 +7,7 @@ order, so the result does not depend on the number of threads.
 
 from functools import cache
 
-from physics.compiler.barrier import wait
+from physics.compiler.atomics import wait_for_all
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry
 from physics.integrators.kick import make_kick
@@ -21,9 +21,12 @@ from physics.manybody.blocks import (
     make_place_block,
 )
 from physics.model.features import EULER, Features
+from physics.model.state import STARTS_ANEW
 
 # what a call continues with, see `make_spring_steps`
 STEP, RESUME, REFRESH = range(3)
+# where the counts of the threads begin in the progress
+FIRST_COUNT = 8
 # consecutive batches that one thread takes
 BATCHES = 4
 
@@ -43,42 +46,46 @@ def make_spring_steps(features: Features):
     ):  # fmt: skip
         """All threads call it with the same arguments but their workspace and `thread`.
 
-        progress: [8 + threads] substeps done; STEP, RESUME after pairs have been searched, or
-        REFRESH, which computes forces only; 1: pairs have to be searched; and, from 8 on, how many
-        bodies of each thread have left their margin.
+        progress: [FIRST_COUNT + threads] substeps done; STEP, RESUME after pairs have been searched
+        or REFRESH, which computes forces only; 1: pairs have to be searched; at 6 why it refreshes;
+        and from FIRST_COUNT on how many bodies of each thread have left their margin.
         """
         _ = sources
         blocks, batches = crowd.solid.shape[0], crowd.order.shape[0]
         first, last = thread * blocks // threads, (thread + 1) * blocks // threads
         done, phase = progress[0], progress[1]
-        wait(barrier, threads)  # before any thread writes the progress
+        wait_for_all(barrier, 0, threads)  # before any thread writes the progress
         while done < substeps or phase != STEP:
             if phase == STEP:
                 far = 0
                 for m in range(first, last):
                     far += move_block(model, workspace, crowd, m, before * h, h)
-                progress[8 + thread] = far
-                wait(barrier, threads)
+                progress[FIRST_COUNT + thread] = far
+                wait_for_all(barrier, 0, threads)
                 far = 0
                 for t in range(threads):
-                    far += progress[8 + t]
+                    far += progress[FIRST_COUNT + t]
                 if far > 0:
-                    wait(barrier, threads)
+                    wait_for_all(barrier, 0, threads)
                     if thread == 0:
                         progress[0], progress[1], progress[2] = done, RESUME, 1
                     return
             elif phase == REFRESH:
                 for m in range(first, last):
                     place_block(model, workspace, crowd, m)
-                wait(barrier, threads)
+                wait_for_all(barrier, 0, threads)
             step = 0.0 if phase == REFRESH else h
             elapsed = done * h + step
+            # new forces alone change nothing that contacts remember
+            remembers = phase != REFRESH or progress[6] == STARTS_ANEW
             starts = phase != REFRESH and done > 0 and done % collision_substeps == 0
             for n in range(batches):
                 if n // BATCHES % threads == thread:
                     b = crowd.order[n]
-                    batch_forces(model, state, workspace, crowd, pairs, b, step, elapsed, starts)
-            wait(barrier, threads)
+                    batch_forces(
+                        model, state, workspace, crowd, pairs, b, step, elapsed, starts, remembers
+                    )
+            wait_for_all(barrier, 0, threads)
             for m in range(first, last):
                 known_forces(model, workspace, crowd, m)
                 add_contacts(crowd, pairs, m, crowd.solid[m].force, crowd.solid[m].torque)
@@ -87,7 +94,7 @@ def make_spring_steps(features: Features):
                     kick(own, block_workspace(workspace, crowd, m), 0.5 * h)
             done += 0 if phase == REFRESH else 1
             phase = STEP
-        wait(barrier, threads)
+        wait_for_all(barrier, 0, threads)
         if thread == 0:
             progress[0], progress[1], progress[2] = done, STEP, 0
 

@@ -4,6 +4,8 @@ from functools import cache
 
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, entry
+from physics.manybody.blocks import make_place_block, write_tensors
+from physics.model.features import Features
 from physics.step.time_layers import LARGEST
 
 
@@ -57,3 +59,19 @@ def make_store_bodies():
         return diverged
 
     return store_bodies
+
+
+@cache
+def make_place_bodies(features: Features):
+    """Entry point that writes the frames and tensors of bodies at rest in their blocks."""
+    sources = SOURCES
+    place_block = make_place_block(features)
+
+    @entry
+    def place_bodies(model, workspace, crowd):
+        _ = sources
+        for m in range(crowd.solid.shape[0]):
+            place_block(model, workspace, crowd, m)
+            write_tensors(crowd, m)
+
+    return place_bodies

@@ -1,6 +1,7 @@
 """Builds a model: the tables of a scene at a fidelity, and the features that it needs."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -139,6 +140,21 @@ def dynamic_rows(scene: Scene) -> Array:
         first = len(scene.bodies) + index
         rows["gripper_partner"][first : first + 2] = first + 1, first
         rows["grip_limit"][first : first + 2] = gripper.grip_limit
+    return rows
+
+
+def build_dynamic(scene: Scene, fidelity: Fidelity, bodies: Sequence[Body]) -> Array:
+    """Rows of DYNAMIC of some bodies under a scene's gravity, without the pairs that they form."""
+    alone = Scene(bodies=[replace(body, name=None, density=None) for body in bodies])
+    count = len(bodies)
+    layout = Layout(
+        solids=tuple(bodies), dynamic_count=count, bodies=count, half_pairs=(), parts=(),
+        modes=np.ones((count, 2)), leverage=np.zeros(count), rolls=np.zeros(count, dtype=bool),
+        gravity=np.array(scene.gravity), fidelity=fidelity,
+    )  # fmt: skip
+    rows = dynamic_rows(alone)
+    for name, values in dynamic_columns(layout, Parameters.of(alone)).items():
+        rows[name] = values[0]
     return rows
 
 

@@ -11,6 +11,7 @@ from physics.model.pairs import Layout, pair_stiffness
 from physics.model.tangential import SHEAR_RATIO, shear_ratio, tangential_coefficients
 from physics.scene.compound import Compound
 from physics.scene.drives import Drive
+from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.shapes import PLANE, Shape
 from physics.scene.solids import Body, Ground
@@ -67,6 +68,79 @@ def dynamic_columns(layout: Layout, p: Parameters) -> Columns:
     }
 
 
+def contact_columns(
+    fidelity: Fidelity,
+    gravity: Array,
+    pairs: tuple[Array, Array],
+    given: Array,
+    mass: Array,
+    friction: Array,
+    restitution: Array,
+    modes: Array,
+    leverage: Array,
+) -> Columns:
+    """Columns [n, pairs] of HALF_PAIR that describe the contact law, by name.
+
+    Args:
+        fidelity: of the physics.
+        gravity: [3] m/s^2.
+        pairs: two arrays [pairs] of solids.
+        given: [pairs] N/m, stiffness of the materials, NaN: it follows from the fidelity.
+        mass: [n, solids] kg, as the next two.
+        friction: of each solid.
+        restitution: likewise.
+        modes: [solids, 2] see `Layout.modes`.
+        leverage: [solids] see `Layout.leverage`.
+    """
+    a, b = pairs
+    restitution = np.maximum(restitution[:, a], restitution[:, b])
+    friction = np.sqrt(friction[:, a] * friction[:, b])
+    h, omega = fidelity.substep, fidelity.contact_resolution / fidelity.substep
+    g = float(np.sqrt(np.sum(gravity**2)))
+    inverse = 1.0 / mass
+    pair_mass = 1.0 / (inverse[:, a] + inverse[:, b])
+    along, across = modes[:, 0], modes[:, 1]
+    soft = np.minimum(1.0, _CUBE_ROCKING / np.maximum(along[a], along[b]))
+    stiffness = np.where(np.isnan(given), pair_mass * omega**2 * soft, given)
+    # effective mass of a tangential force at the surface, rotation included
+    shear = 1.0 / (mass / across)
+    shear_mass = 1.0 / (shear[:, a] + shear[:, b])
+    shear_stiffness, shear_damping = tangential_coefficients(
+        stiffness,
+        pair_mass,
+        shear_mass,
+        leverage[a] + leverage[b],
+        shear_ratios(fidelity, given),
+        h,
+    )
+    if fidelity.law == "impulse":
+        damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
+        damping_error = np.zeros(stiffness.shape)
+        slowest = np.full(stiffness.shape, REST_STEPS * g * h)
+    else:
+        floor = _SLIM_RESTITUTION * fidelity.contact_resolution * (1.0 - soft)
+        reached = np.maximum(restitution, floor)
+        damping = damping_coefficients(reached, fidelity.damping)
+        damping_error = damping_errors(reached, damping, fidelity.damping)
+        slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
+    return {
+        "stiffness": stiffness,
+        "damping": damping,
+        "damping_error": damping_error,
+        "restitution": restitution,
+        "rest_speed": slowest,
+        "pair_mass": pair_mass,
+        "shear_stiffness": shear_stiffness,
+        "shear_damping": shear_damping,
+        "friction": friction,
+    }
+
+
+def shear_ratios(fidelity: Fidelity, given: Array) -> Array:
+    """Ratio of shear to normal stiffness of pairs; `given` as in `contact_columns`."""
+    return np.where(np.isnan(given), shear_ratio(fidelity.contact_resolution), SHEAR_RATIO)
+
+
 def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
     """Columns [n, half-pairs, ...] of HALF_PAIR, by name."""
     solids, half_pairs, fidelity = layout.solids, layout.half_pairs, layout.fidelity
@@ -79,29 +153,14 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
     size = _of_solids(p.size, [1.0] * len(rest))
     friction = _of_solids(p.friction, [s.material.friction for s in rest])
     restitution = _of_solids(p.restitution, [s.material.restitution for s in rest])
-    restitution = np.maximum(restitution[:, a], restitution[:, b])
-    friction = np.sqrt(friction[:, a] * friction[:, b])
     given = np.array([pair_stiffness(solids[i].material, solids[j].material)
                       for i, j in zip(a, b, strict=True)])  # fmt: skip
-
+    contact = contact_columns(
+        fidelity, layout.gravity, (a, b), given, mass, friction, restitution, layout.modes,
+        layout.leverage,
+    )  # fmt: skip
     h, omega = fidelity.substep, fidelity.contact_resolution / fidelity.substep
-    g = float(np.sqrt(np.sum(layout.gravity**2)))
     inverse = 1.0 / mass
-    pair_mass = 1.0 / (inverse[:, a] + inverse[:, b])
-    along, across = layout.modes[:, 0], layout.modes[:, 1]
-    soft = np.minimum(1.0, _CUBE_ROCKING / np.maximum(along[a], along[b]))
-    stiffness = np.where(np.isnan(given), pair_mass * omega**2 * soft, given)
-    # effective mass of a tangential force at the surface, rotation included
-    shear = 1.0 / (mass / across)
-    shear_mass = 1.0 / (shear[:, a] + shear[:, b])
-    shear_stiffness, shear_damping = tangential_coefficients(
-        stiffness,
-        pair_mass,
-        shear_mass,
-        layout.leverage[a] + layout.leverage[b],
-        np.where(np.isnan(given), shear_ratio(fidelity.contact_resolution), SHEAR_RATIO),
-        h,
-    )
 
     least = _of_solids(_inertia(layout, p).min(axis=-1), [np.inf] * len(rest))
     turns = (a < layout.bodies) | (b < layout.bodies)  # a drive on the ground never rotates
@@ -114,17 +173,6 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         np.array(SHEAR_RATIO),
         h,
     )
-
-    if fidelity.law == "impulse":
-        damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
-        damping_error = np.zeros(stiffness.shape)
-        slowest = np.full(stiffness.shape, REST_STEPS * g * h)
-    else:
-        floor = _SLIM_RESTITUTION * fidelity.contact_resolution * (1.0 - soft)
-        reached = np.maximum(restitution, floor)
-        damping = damping_coefficients(reached, fidelity.damping)
-        damping_error = damping_errors(reached, damping, fidelity.damping)
-        slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
 
     # only the widths of dynamic bodies limit the skin
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
@@ -159,20 +207,12 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "load_share": np.where(shared, other / (own + other), 1.0),
         "skin": fidelity.skin * np.minimum(moving[:, a], moving[:, b]),
         "free_motion": 0.5 * fidelity.courant * np.minimum(widths[:, a], widths[:, b]),
-        "stiffness": stiffness,
-        "damping": damping,
-        "damping_error": damping_error,
-        "restitution": restitution,
-        "rest_speed": slowest,
-        "pair_mass": pair_mass,
+        **contact,
         "owner_inverse_mass": inverse[:, a],
         "surface_inverse_mass": inverse[:, b],
         "overlap_share": _overlap_share(layout, mass, a, b),
         "surface_centre": _surface_centres(layout, size[:, b]),
         "surface_inverse_inertia": _surface_inverse_inertia(layout, p),
-        "shear_stiffness": shear_stiffness,
-        "shear_damping": shear_damping,
-        "friction": friction,
         "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
         "twist_damping": np.where(turns, twist_damping, 0.0),
     }

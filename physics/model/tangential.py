@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from physics.compiler.jit import stage
 from physics.scene.fidelity import Fidelity
 
 Array = np.ndarray
@@ -27,6 +28,7 @@ def shear_ratio(resolution: float) -> float:
     return min(1.0, SHEAR_RATIO * max(1.0, (Fidelity.contact_resolution / resolution) ** 2))
 
 
+@stage
 def tangential_coefficients(
     stiffness: Array,
     pair_mass: Array,

@@ -9,6 +9,7 @@ threads can call it at the same time. The number of threads is independent of th
 """
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 
@@ -19,7 +20,21 @@ from physics.scene.validation import integer
 _BLOCK = 8
 
 _pools: dict[int, ThreadPoolExecutor] = {}
-os.register_at_fork(after_in_child=_pools.clear)
+# of threads that wait for each other. One call at a time has them, or two could wait for ever, each
+# for threads that the other has
+_teams: dict[int, ThreadPoolExecutor] = {}
+_team_lock = threading.Lock()
+
+
+def _after_fork() -> None:
+    """Threads of the parent process don't exist in the child."""
+    global _team_lock
+    _pools.clear()
+    _teams.clear()
+    _team_lock = threading.Lock()
+
+
+os.register_at_fork(after_in_child=_after_fork)
 
 
 def default_threads() -> int:
@@ -62,3 +77,23 @@ def run_in_blocks(run: Callable[[int, int], int], count: int, threads: int) -> i
     finally:  # all threads must have stopped writing before an error reaches the caller
         wait(futures)
     return total + sum(future.result() for future in futures)
+
+
+def run_together(run: Callable[[int], object], threads: int) -> None:
+    """Calls run(0), run(1), ... run(threads - 1) at the same time, the first in this thread.
+
+    They may wait for each other. If the machine has fewer cores, they take turns.
+    """
+    if threads == 1:
+        run(0)
+        return
+    with _team_lock:
+        if threads not in _teams:
+            _teams[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="team")
+        futures = [_teams[threads].submit(run, thread) for thread in range(1, threads)]
+        try:
+            run(0)
+        finally:
+            wait(futures)
+        for future in futures:
+            future.result()

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from physics import Body, Box, Fidelity, Ground, Scene, SimulationDiverged, World
+from physics import Body, Box, ContactOverflow, Fidelity, Ground, Scene, SimulationDiverged, World
 from physics.analysis.lane_queries import LaneQueries
 from physics.manybody import simulation as many
 from physics.step.simulation import Simulation
@@ -189,3 +189,60 @@ def test_a_stiffness_that_is_too_large_for_the_step_is_refused():
     ]  # fmt: skip
     with pytest.raises(ValueError, match="the largest safe step is"):
         World(Scene(stiff, cubes.statics), Fidelity())
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_queries_tell_of_the_restored_state_and_change_no_bit(law):
+    world, other = World(heap(40), law), World(heap(40), law)
+    for one in (world, other):
+        one.advance(0.3)
+    deepest, saved = world.penetration()[0], world.snapshot()
+    world.advance(0.1)
+    world.restore(saved)
+    assert world.penetration()[0] == deepest
+    force = world.contacts().force
+    fresh = World(heap(40), law)
+    fresh.restore(saved)
+    assert fresh.penetration()[0] == deepest
+    assert np.array_equal(fresh.contacts().force, force)
+    for one in (world, other):
+        one.apply_wrench(force=(0.2, 0.0, 0.0), body=5)
+        one.advance(0.02)
+    for _ in range(3):
+        world.contacts()
+        world.force()
+    for one in (world, other):
+        one.advance(0.04)
+    assert state_of(world) == state_of(other)
+
+
+def test_a_call_that_is_interrupted_changes_nothing(monkeypatch):
+    world = World(heap(40), "balanced")
+    world.advance(0.3)
+    before, search, calls = state_of(world), many.PairLists.search, []
+
+    def interrupted(lists, crowd):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return search(lists, crowd)
+
+    monkeypatch.setattr(many.PairLists, "search", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        world.advance(0.2)
+    assert state_of(world) == before
+    assert world.time[0] == pytest.approx(0.3)
+    monkeypatch.setattr(many.PairLists, "search", search)
+    world.advance(0.1)
+    assert np.abs(world.position[0, :, :2]).max() < 0.3
+    assert world.position[0, :, 2].min() > 0.5 * HALF
+
+
+def test_too_many_pairs_of_particles_are_an_error():
+    close = [
+        Body(CUBE, position=(2.5 * HALF * n, 0.0, HALF), material=wall(1, 1).bodies[0].material)
+        for n in range(40)
+    ]
+    world = World(Scene(close), Fidelity(geometry="particle", spacing=0.1, skin=1.0))
+    with pytest.raises(ContactOverflow):
+        world.advance(0.01)

@@ -1,0 +1,1 @@
+"""Heaps of particle bodies in one world: neighbour lists, packed contacts, threads."""
