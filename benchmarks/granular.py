@@ -53,8 +53,8 @@ def run(simulation: GranularSimulation, steps: int) -> float:
 
 def heaps(python: Path | None) -> Iterator[Table]:
     """Harada's scenes against LAMMPS."""
-    rows: list[list[Cell]] = []
     for name, (count, shape) in HEAPS.items():
+        rows: list[list[Cell]] = []
         scene = heap_scene([shape] * count, COLUMNS, MATERIAL)
         for label, friction in FRICTIONS.items():
             simulation = GranularSimulation(scene, fidelity(friction), 1, THREADS)
@@ -63,7 +63,7 @@ def heaps(python: Path | None) -> Iterator[Table]:
                 run(simulation, first - done)
                 start = simulation.state.dynamic.copy()
                 peer = None
-                if python:  # best_run
+                if python:
                     peer = lammps.best_run(python, simulation, steps, TRIED)
                 simulation.state.dynamic[:] = start
                 simulation.forget(simulation.everyone)
@@ -77,10 +77,10 @@ def heaps(python: Path | None) -> Iterator[Table]:
                         height, peer and peer.height,
                     ]
                 )  # fmt: skip
-    yield Table(
-        "granular", "Steps per second of heaps, two threads or MPI ranks",
-        ["heap", "ours", "LAMMPS", "ratio", "skin", "height m", "LAMMPS's"], rows,
-    )  # fmt: skip
+        yield Table(
+            f"granular_{name}", f"Steps per second of {name}, two threads or MPI ranks",
+            ["heap", "ours", "LAMMPS", "ratio", "skin", "height m", "LAMMPS's"], rows,
+        )  # fmt: skip
 
 
 def sizes() -> Iterator[Table]:

@@ -134,8 +134,11 @@ def _coefficients(simulation: GranularSimulation, of_walls: bool) -> str:
 def _script(simulation: GranularSimulation, steps: int, skin: float) -> str:
     style = "hooke/history" if simulation.heap_features.history else "hooke"
     radius, h = float(simulation.particles[1][0, 3]), simulation.fidelity.substep
-    # rigid/small asks for ghosts as far as a body reaches
-    reach = max(body.shape.reach for body in simulation.scene.bodies[:1])
+    # a body belongs to the rank of its innermost particle, which must see the other ones
+    body, local = simulation.particles
+    points = local[body == 0, :3]
+    inner = points[np.argmin(np.sum(points**2, axis=1))]
+    reach = float(np.sqrt(np.sum((points - inner) ** 2, axis=1)).max())
     cutoff = max(1.02 * reach, (2.0 + skin) * radius)
     walls = [
         f"fix wall{k} all wall/gran {style} {_coefficients(simulation, True)} {wall}"

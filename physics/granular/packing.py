@@ -218,11 +218,12 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
     first[count + 1 :] = first[count]
     counts = bodies.particles[order]
     particles = np.repeat(heap.first[places], counts) + _within(counts)
-    where = np.empty_like(particles)  # new index of each particle
-    where[particles] = np.arange(len(particles))
+    where = np.empty(len(particles), heap.pair.dtype)  # new index of each particle
+    where[particles] = np.arange(len(particles), dtype=where.dtype)
 
     def moved(pairs: Array) -> Array:
-        return np.asarray(where[pairs].astype(pairs.dtype))
+        # without history nothing of the old list is read again
+        return np.asarray(where[pairs]) if heap.shear.size else pairs
 
     wall = heap.wall.copy()
     wall[..., 0] = moved(np.minimum(wall[..., 0], len(where) - 1))

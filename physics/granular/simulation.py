@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from physics.compiler.jit import columns
 from physics.granular.advance import make_advance
 from physics.granular.classes import bodies_of, constants_of
 from physics.granular.coefficients import contact_coefficients
@@ -97,10 +96,9 @@ class GranularSimulation:
         self._scratch: Scratch = scratch_for(self.heaps[0], radii, threads)
         self._advance, self._readout = make_advance(self.heap_features), make_readout(self.features)
         self._fresh = False
-        self._table = columns((self.bodies, WIDTH), count, float)
+        self._table = np.empty((0, WIDTH, count))  # allocated when it is read
         self._table_valid = False
         self.last_substep, self._last_worlds = math.nan, self.everyone
-        self._initial = self._initial_rows()
         self.reset(self.everyone)
 
     def _heap_features(self) -> HeapFeatures:
@@ -144,7 +142,7 @@ class GranularSimulation:
 
     def reset(self, worlds: Array) -> None:
         """Puts the worlds of a mask into the scene's state, at time zero."""
-        self.state.dynamic[worlds] = self._initial
+        self.state.dynamic[worlds] = self._initial_rows()
         self.state.world["time"][worlds] = 0.0
         self.forget(worlds)
 
@@ -255,7 +253,7 @@ class GranularSimulation:
     def readout(self) -> Readout:
         """All poses and velocities now: read-only."""
         if not self._table_valid:
-            self._table = np.empty_like(self._table)
+            self._table = np.empty((self.bodies, WIDTH, self.count))
             self._readout(self.model, self.state, self._table)
             self._table_valid = True
         return Readout(read_only(self._table[..., : self.count].transpose(2, 0, 1)))
