@@ -15,6 +15,9 @@ from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
+from physics.granular.queries import GranularQueries
+from physics.granular.simulation import GranularSimulation
+from physics.granular.support import supports
 from physics.manybody.limits import check_crowd
 from physics.manybody.queries import CrowdQueries
 from physics.manybody.simulation import CrowdSimulation, is_crowd
@@ -72,12 +75,19 @@ class World:
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
         arguments = scene, self.fidelity, self.count, self.threads, per_world_parameters
         self._simulation: Simulation
-        self._queries: LaneQueries | CrowdQueries
-        if is_crowd(scene, self.fidelity, per_world_parameters):
+        self._queries: LaneQueries | CrowdQueries | GranularQueries
+        if is_crowd(scene, self.fidelity, per_world_parameters) and not supports(
+            scene, self.fidelity
+        ):
+            heap = GranularSimulation(*arguments[:-1])
+            self._simulation, self._queries = heap, GranularQueries(heap)
+            if not allow_unstable:
+                check_crowd(scene, self.fidelity, heap.classes())
+        elif is_crowd(scene, self.fidelity, per_world_parameters):
             crowd = CrowdSimulation(*arguments)
             self._simulation, self._queries = crowd, CrowdQueries(crowd)
             if not allow_unstable:
-                check_crowd(scene, self.fidelity, crowd.kinds)
+                check_crowd(scene, self.fidelity, crowd.kinds.of_solid)
         else:
             self._simulation = Simulation(*arguments)
             self._queries = LaneQueries(self._simulation)
@@ -294,7 +304,7 @@ class World:
                 is unstable or a body sinks. The message names the solid that limits the substep and
                 the largest safe one.
         """
-        if isinstance(self._queries, CrowdQueries):
+        if not isinstance(self._queries, LaneQueries):
             raise ValueError(
                 f"check_parameters is for worlds side by side; a world of {len(self.scene.bodies)} "
                 "bodies has no per-world parameters: build one with per_world_parameters=True"

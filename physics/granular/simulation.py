@@ -44,14 +44,14 @@ from physics.scene.fidelity import INTEGRATORS, Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.step.readout import WIDTH, Readout, make_readout
-from physics.step.simulation import angular_momentum_of, read_only
+from physics.step.simulation import Simulation, angular_momentum_of, read_only
 from physics.step.threads import run_together
 from physics.step.time_layers import substep_count
 
 Array = np.ndarray
 
 
-class GranularSimulation:
+class GranularSimulation(Simulation):
     """`count` worlds of a heap of particle bodies, one after the other.
 
     Args:
@@ -188,7 +188,11 @@ class GranularSimulation:
         for w in np.flatnonzero(worlds):
             if status["diverged"][w] == 0:
                 refresh = bool(status["needs_refresh"][w] != 0)
-                bad = self._run_heap(int(w), h, steps, refresh)
+                try:
+                    bad = self._run_heap(int(w), h, steps, refresh)
+                except BaseException:  # interrupted: the world is as before, contacts begin afresh
+                    self.forget(np.arange(self.count) == w)
+                    raise
                 status["time"][w] += int(self._scratch.result[STEPS]) * h
                 status["diverged"][w] = bad + 1
                 status["needs_refresh"][w] = 0
@@ -314,13 +318,34 @@ class GranularSimulation:
         depths = [self.contacts(w).penetration for w in range(self.count)]
         return np.array([depth.max(initial=0.0) for depth in depths])
 
-    def copy_hidden(self) -> list[Heap]:
+    def classes(self) -> Array:
+        """[solids] a number for each: equal ones have the same coefficients with any other."""
+        statics = 1 + self._bodies.class_of.max() + np.arange(len(self.scene.statics))
+        return np.concatenate([self._bodies.class_of, statics])
+
+    @property
+    def hidden_nbytes(self) -> int:
+        """Bytes of lists and contact memories."""
+        return sum(array.nbytes for heap in self.heaps for array in heap)
+
+    def add_wrench(self, wrench: Array) -> None:
+        """Not offered here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(
+            f"apply_wrench is not offered in a heap of {self.bodies} bodies of particles with "
+            'damping="dashpot"; Fidelity(damping="hunt_crossley") simulates the scene with it'
+        )
+
+    def saved(self) -> list[Heap]:
         """A deep copy of the hidden state; with one of `state` a run continues bitwise equal."""
         return [Heap(*(array.copy() for array in heap)) for heap in self.heaps]
 
-    def restore_hidden(self, heaps: list[Heap]) -> None:
+    def restore(self, saved: list[Heap]) -> None:
         """Returns to a copy of the hidden state."""
-        self.heaps = [Heap(*(array.copy() for array in heap)) for heap in heaps]
+        self.heaps = [Heap(*(array.copy() for array in heap)) for heap in saved]
         self.changed()
         for w in range(self.count):
             self._make_room(w, DONE, 0)

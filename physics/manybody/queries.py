@@ -5,20 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from physics.analysis import stability
+from physics.analysis.contact_system import ContactSystem
 from physics.analysis.diagnostics import Contacts, samples
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.manybody.reports import TOUCH, ReportArrays, make_touching
 from physics.manybody.simulation import CrowdSimulation
 from physics.model.workspace import CONTACT_ROW
-from physics.rotation import rotation_matrix
 from physics.spring.contact_loop import REPORT
 
 Array = np.ndarray
-
-# steps of the power iteration for the largest frequency, and the change at which it ends
-_MOST_ITERATIONS = 200
-_CONVERGED = 1e-3
 
 
 class CrowdQueries:
@@ -141,89 +136,15 @@ class CrowdQueries:
         return first != second and kinds.pair[kinds.of_solid[first], kinds.of_solid[second]] >= 0
 
     def largest_stable_step(self, world: int) -> float:
-        """Largest stable step in s with a world's present contacts; inf if nothing limits it.
-
-        By power iteration: the stiffness matrix is a sum over contacts and is never written down.
-        """
+        """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         simulation = self._simulation
         if simulation.features.impulse:
             return math.inf
         found = self._touching(world)
-        if not len(found):
-            return math.inf
-        system = _Contacts(simulation, world, found)
-        x = np.random.default_rng(0).normal(size=(simulation.bodies, 6))
-
-        def load(h: float) -> float:
-            nonlocal x  # a good start for the next step
-            size, loads = 0.0, system.loads(h)
-            for _ in range(_MOST_ITERATIONS):
-                x = x / np.sqrt(system.product(x, x))
-                y = system.accelerate(loads, x)
-                new = system.product(x, y)
-                x = y
-                if abs(new - size) <= _CONVERGED * new:
-                    break
-                size = new
-            return new
-
-        return stability.root(load)
-
-
-class _Contacts:
-    """A world's contacts as a linear system, in displacements and rotations [bodies, 6]."""
-
-    def __init__(self, simulation: CrowdSimulation, world: int, found: Array) -> None:
-        bodies = simulation.bodies
-        dynamic = simulation.state.dynamic[world]
-        self._rows, self._features = found, simulation.features
-        kinds, self._of_kind = np.unique(found["half_pair"], return_inverse=True)
-        self._kinds = simulation.kinds.model.half_pair[kinds]
-        self._ends = [(found["owner"], 1.0), (found["surface"], -1.0)]
-        self._bodies = bodies
-        self._arm = [
-            found["point"] - dynamic["position"][np.minimum(place, bodies - 1)]
-            for place, _ in self._ends
-        ]
-        base = simulation.base.dynamic
-        turn = rotation_matrix(dynamic["orientation"])
-        self._inverse_mass = base["inverse_mass"][:, None]
-        self._inverse = np.einsum("bij,bj,bkj->bik", turn, base["inverse_inertia"], turn)
-        self._inertia = np.einsum("bij,bj,bkj->bik", turn, base["inertia"], turn)
-
-    def product(self, x: Array, y: Array) -> float:
-        """The product x M y with the mass matrix M."""
-        moved = np.sum(x[:, :3] * y[:, :3] / self._inverse_mass)
-        return float(moved + np.einsum("bi,bij,bj->", x[:, 3:], self._inertia, y[:, 3:]))
-
-    def loads(self, h: float) -> tuple[Array, Array, Array]:
-        """Of each contact, along the normal and across it in kg, and against rotation in kg m^2."""
-        dashpot, viscous = self._features.dashpot, self._features.viscous
-        along = np.array([stability.normal_load(row, dashpot, h) for row in self._kinds])
-        across = np.array([stability.shear_load(row, viscous, h) for row in self._kinds])
-        twist = np.array([stability.twist_load(row, h) for row in self._kinds])
-        return along[self._of_kind], across[self._of_kind], twist[self._of_kind]
-
-    def accelerate(self, loads: tuple[Array, Array, Array], x: Array) -> Array:
-        """M^-1 A x, see `analysis.stability`."""
-        along, across, twist = loads
-        weight, normal = self._rows["weight"], self._rows["normal"]
-        moved, turned = np.zeros_like(normal), np.zeros_like(normal)
-        for (place, sign), arm in zip(self._ends, self._arm, strict=True):
-            of = np.minimum(place, self._bodies - 1)
-            is_body = (place < self._bodies)[:, None]
-            moved += np.where(is_body, sign * (x[of, :3] + np.cross(x[of, 3:], arm)), 0.0)
-            turned += np.where(is_body, sign * x[of, 3:], 0.0)
-        normal_part = np.sum(moved * normal, axis=1)[:, None] * normal
-        force = weight[:, None] * (
-            along[:, None] * normal_part + across[:, None] * (moved - normal_part)
-        )
-        torque = (weight * twist)[:, None] * turned
-        out = np.zeros_like(x)
-        for (place, sign), arm in zip(self._ends, self._arm, strict=True):
-            own = place < self._bodies
-            np.add.at(out[:, :3], place[own], sign * force[own])
-            np.add.at(out[:, 3:], place[own], sign * (np.cross(arm, force) + torque)[own])
-        out[:, :3] *= self._inverse_mass
-        out[:, 3:] = np.einsum("bij,bj->bi", self._inverse, out[:, 3:])
-        return out
+        kinds, kind = np.unique(found["half_pair"], return_inverse=True)
+        rows, ends = simulation.kinds.model.half_pair[kinds], [found["owner"], found["surface"]]
+        return ContactSystem(
+            simulation.state.dynamic[world], simulation.base.dynamic,
+            self._solid(np.stack(ends, axis=-1)), found["point"], found["normal"], found["weight"],
+            list(rows), kind, simulation.features.dashpot, simulation.features.viscous,
+        ).largest_stable_step()  # fmt: skip

@@ -6,8 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.reference.heaps import heap_scene
 from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.material import Material
+from physics.scene.particles import Particles
+from physics.scene.ready_bodies import chess_piece, torus
 from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Capsule, Shape, Sphere
 from physics.scene.solids import Body, Ground, Static
@@ -124,7 +127,29 @@ def dominoes(count: int, seed: int = 0) -> LargeScene:
     return LargeScene(Scene(bodies, [Ground(material)]), PRESETS["balanced"])
 
 
+def _particles(shape: Particles, count: int, seed: int) -> LargeScene:
+    """Harada's heaps: equal bodies of balls of 1 cm, dropped into a box."""
+    columns = max(1, round((0.7 * count) ** (1 / 3)))
+    scene = heap_scene([shape] * count, columns, Material(friction=0.5, restitution=0.3), seed=seed)
+    fidelity = Fidelity(
+        damping="dashpot", friction="viscous", substep=1.5e-4, contact_resolution=0.25
+    )
+    return LargeScene(scene, fidelity)
+
+
+def chess(count: int, seed: int = 0) -> LargeScene:
+    """Chess pieces of four balls in a row fall between four walls."""
+    return _particles(chess_piece(0.01), count, seed)
+
+
+def tori(count: int, seed: int = 0) -> LargeScene:
+    """Rings of six balls fall between four walls."""
+    return _particles(torus(0.01), count, seed)
+
+
 SCENES: dict[str, Callable[[int, int], LargeScene]] = {
+    "chess": chess,
+    "tori": tori,
     "pyramid": pyramid,
     "dominoes": dominoes,
     "rubble": rubble,

@@ -79,7 +79,9 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
     """Flags of a scene of many bodies."""
-    parser.add_argument("scene", metavar="SCENE", help="pyramid, dominoes, rubble or heap")
+    parser.add_argument(
+        "scene", metavar="SCENE", help="chess, tori, pyramid, dominoes, rubble or heap"
+    )
     parser.add_argument(
         "--bodies", type=count, default=1000, help="number of bodies (default: %(default)s)"
     )

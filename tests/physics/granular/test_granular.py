@@ -19,6 +19,7 @@ from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Sphere
 from physics.scene.solids import Body, Ground, Static
 from physics.step.simulation import Simulation
+from physics.world import World
 
 R = 0.02
 STEP = 5e-4
@@ -206,11 +207,11 @@ def test_a_heap_settles_and_never_gains_energy(friction):
 def test_a_copy_continues_bitwise_equal():
     heap = simulation(small_heap())
     advance(heap, 333)
-    hidden, state = heap.copy_hidden(), heap.state.dynamic.copy()
+    hidden, state = heap.saved(), heap.state.dynamic.copy()
     advance(heap, 200)
     expected = digest(heap)
     heap.state.dynamic[:] = state
-    heap.restore_hidden(hidden)
+    heap.restore(hidden)
     advance(heap, 200)
     assert digest(heap) == expected
 
@@ -290,3 +291,32 @@ def test_ready_bodies_have_principal_axes():
     assert np.linalg.norm(ring.points[0] - ring.points[1]) == pytest.approx(0.2)
     with pytest.raises(ValueError, match="torus balls"):
         torus(0.1, balls=2)
+
+
+@pytest.mark.parametrize("friction", ["viscous", "coulomb"])
+def test_worlds_of_many_particle_bodies_are_heaps(friction):
+    scene = heap_scene([chess_piece(R)] * 40, 4, ROUGH)
+    world = World(scene, FIDELITIES[friction])
+    assert isinstance(world._simulation, GranularSimulation)
+    world.advance(0.4)
+    saved, deepest = world.snapshot(), world.penetration()[0]
+    contacts = world.contacts()
+    assert deepest == contacts.penetration.max() > 0.0
+    world.advance(0.05)
+    after = world.position.copy()
+    world.restore(saved)
+    assert world.penetration()[0] == deepest
+    world.advance(0.05)
+    assert np.array_equal(world.position, after)
+    assert world.samples(0)[0].shape == (4, 3)
+    assert STEP < world.largest_stable_step() < 10.0 * STEP
+    with pytest.raises(ValueError, match="apply_wrench is not offered in a heap of 40 bodies"):
+        world.apply_wrench(force=(0.0, 0.0, 1.0), body=0)
+    with pytest.raises(ValueError, match="first_touch is not recorded"):
+        world.first_touch(0, 1)
+
+
+def test_a_stiffness_that_is_too_large_for_a_heap_is_refused():
+    scene = heap_scene([chess_piece(R)] * 40, 4, Material(0.5, stiffness=1e8))
+    with pytest.raises(ValueError, match="makes the substep of 0.0005 s unstable"):
+        World(scene, FIDELITIES["viscous"])

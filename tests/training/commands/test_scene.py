@@ -39,7 +39,7 @@ def test_ctrl_c_ends_a_scene_with_what_was_made(capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["cards"], r"unknown scene 'cards': choose one of pyramid, dominoes"),
+        (["cards"], r"unknown scene 'cards': choose one of chess, tori, pyramid"),
         (["heap", "--bodies", "0"], r"'0' should be an integer of at least 1"),
         (["heap", "--seconds", "-1"], r"'-1' should be a finite number above 0"),
         (["heap", "--seconds", "nan"], r"'nan' should be a finite number above 0"),
