@@ -318,5 +318,5 @@ def test_worlds_of_many_particle_bodies_are_heaps(friction):
 
 def test_a_stiffness_that_is_too_large_for_a_heap_is_refused():
     scene = heap_scene([chess_piece(R)] * 40, 4, Material(0.5, stiffness=1e8))
-    with pytest.raises(ValueError, match="makes the substep of 0.0005 s unstable"):
+    with pytest.raises(ValueError, match="makes the substep of"):
         World(scene, FIDELITIES["viscous"])
