@@ -101,7 +101,7 @@ class PairLists:
                 homes, settled,
             )  # fmt: skip
             if settled < len(found):
-                self._grow(len(found) - settled)
+                self._grow(found[settled:][homes[settled:] < 0])
         self.found, self.homes = found, homes
         self._repack()
         return self.listed(crowd, margin[: self._bodies].reshape(-1, LANES))
@@ -143,14 +143,24 @@ class PairLists:
                 return found
             self._room = np.zeros(count + count // 4, np.int64)
 
-    def _grow(self, missing: int) -> None:
-        """Room for more pairs: at least those that are missing, each kind of which may be new."""
-        kind = self._kinds.pair_kind
-        more = 1 + missing // LANES + len(kind) + len(self.pairs.kind) // 2
-        slots, work = int(kind["slot_count"].max()), int(kind["half_pair_count"].max())
-        batches = len(self.pairs.kind) + more
-        rows = int(self._free.used[1]) + more * slots, int(self._free.used[2]) + more * work
-        enough = max(rows[0], self.pairs.candidate.shape[1]), max(rows[1], len(self.pairs.work))
+    def _grow(self, new: Array) -> None:
+        """Room for new pairs [n] and, so that it is seldom needed, for half as many as there are.
+
+        A kind needs a batch for LANES pairs and one more, of which some lanes stay free. With
+        impulses colours may need more, and then this is called again.
+        """
+        kind, free = self._kinds.pair_kind, self._free
+        one, two = np.divmod(new, self._places)
+        kinds = self._kinds.pair[self._kind[one], self._kind[two]]
+        counts = np.bincount(kinds, minlength=len(kind))
+        more = np.where(counts > 0, 1 + counts // LANES, 0)
+        used = free.used + free.used // 2
+        batches = int(used[0] + more.sum())
+        enough = (
+            max(int(used[1] + more @ kind["slot_count"]), self.pairs.candidate.shape[1]),
+            max(int(used[2] + more @ kind["half_pair_count"]), len(self.pairs.work)),
+        )
+        batches = max(batches, len(self.pairs.kind))
         check_memory(self.pairs, batches, *enough)
         self.pairs = with_room(self.pairs, self._kinds.features, batches, *enough)
         following = np.full(batches * LANES, -1)
