@@ -239,10 +239,8 @@ def store(model, state, workspace, i, time):
         sign = -1.0 if solid.orientation[3, i] < 0.0 else 1.0
         for c in range(4):
             row.orientation[c] = sign * solid.orientation[c, i]
-    listed = 0
     for k in range(model.half_pair.shape[0]):
         half_pair, saved = workspace.half_pair[k], state.half_pair[w, k]
-        listed |= (1 if half_pair.count[i] > 0 else 0) << (k % 63)
         saved.count = half_pair.count[i]
         saved.remaining_skin = half_pair.remaining_skin[i]
         state.touch[k, FIRST_TOUCH, w] = half_pair.first_touch[i]
@@ -252,4 +250,3 @@ def store(model, state, workspace, i, time):
         saved.previous_weight = half_pair.previous_weight[i]
         saved.previous_impact = half_pair.previous_impact[i]
         saved.previous_closing = half_pair.previous_closing[i]
-    state.world[w].listed = listed

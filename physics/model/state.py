@@ -58,7 +58,6 @@ STATUS = np.dtype(
         ("needs_refresh", "i4"),
         ("diverged", "i4"),  # 0, or 1 + index of the first non-finite dynamic body
         ("overflow", "i8"),  # 1: a half-pair had more candidates than room
-        ("listed", "i8"),  # bits of the half-pairs that have candidates, see `step.lane_order`
     ],
     align=True,
 )

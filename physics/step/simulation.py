@@ -28,7 +28,7 @@ from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.solids import Body
 from physics.step.adaptive_steps import make_adaptive_advance
-from physics.step.lane_order import PAUSE, can_sort, sort_worlds
+from physics.step.lane_order import PAUSE, Scratch, can_sort, sort_worlds
 from physics.step.readout import WIDTH, Readout, make_readout
 from physics.step.threads import run_in_blocks
 from physics.step.time_layers import make_advance, substep_count
@@ -71,9 +71,10 @@ class Simulation:
         self.state: State = allocate(self.base, self.features, count)
         self.everyone = np.ones(count, dtype=bool)
         self._idle: list[Workspace] = []
+        self._scratches: list[Scratch] = []
         self._allocate()
         self._find_kernels()
-        self._calls_to_sort = 1
+        self._calls_to_sort = 0
         self._fresh = False
         self._table = columns((len(self.base.dynamic), WIDTH), count, float)
         self._table_valid = self._lent = False
@@ -225,7 +226,7 @@ class Simulation:
 
     def _run(self, h: float, substeps: int, worlds: Array) -> bool:
         """Runs the kernel on the worlds of a mask; returns whether all went well."""
-        kernel, everyone = self._advance, bool(worlds.all())
+        kernel, everyone = self._advance, worlds is self.everyone or bool(worlds.all())
         self.last_substep, self._last_worlds = h, worlds
         if self._lent:  # a reader holds the table
             before = self._table
@@ -234,25 +235,33 @@ class Simulation:
                 self._table[...] = before
         model, state, table = self.model, self.state, self._table
         collision_substeps = self.fidelity.collision_substeps
-        groups, idle = -(-self.count // LANES), self._idle
-        if substeps > 0 and can_sort(self.features, self.count):
-            self._calls_to_sort -= 1
-            if self._calls_to_sort <= 0:
-                moved = sort_worlds(model, state, self.threads)
-                self._calls_to_sort = 1 if moved else PAUSE
+        groups, idle, scratches = -(-self.count // LANES), self._idle, self._scratches
+        self._calls_to_sort -= 1
+        sort = substeps > 0 and self._calls_to_sort <= 0 and can_sort(self.features, self.count)
+        moved = []
 
         def run(first: int, last: int) -> Any:
             try:
                 workspace = idle.pop()
             except IndexError:  # happens once per thread
                 workspace = Workspace.of(self.base, self.features)
+            if sort:
+                try:
+                    scratch = scratches.pop()
+                except IndexError:
+                    scratch = Scratch.of(model, state)
+                moved.append(sort_worlds(model, state, scratch, first, last))
+                scratches.append(scratch)
             failed = kernel(
                 model, state, workspace, table, worlds, first, last, h, substeps, collision_substeps
             )
             idle.append(workspace)
             return failed
 
-        if run_in_blocks(run, groups, self.threads) == 0:
+        failed = run_in_blocks(run, groups, self.threads)
+        if sort:
+            self._calls_to_sort = 1 if any(moved) else PAUSE
+        if failed == 0:
             # worlds that aren't advanced or that diverged before aren't written
             self._table_valid = self._table_valid or everyone
             self._fresh = self._fresh or (everyone and substeps > 0)
@@ -339,13 +348,13 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, Any]:
         """All attributes but kernels and working arrays, which follow from the features."""
-        left_out = ("_advance", "_readout", "_idle", "_load", "_store")
+        left_out = ("_advance", "_readout", "_idle", "_scratches", "_load", "_store")
         return {k: v for k, v in self.__dict__.items() if k not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restores the attributes and finds the kernels."""
         self.__dict__.update(state)
-        self._idle = []
+        self._idle, self._scratches = [], []
         self._find_kernels()
 
 

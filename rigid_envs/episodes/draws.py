@@ -4,7 +4,13 @@ So the episodes of a world do not depend on the other worlds, and thousands of s
 once. The generator is splitmix64 (Steele, Lea and Flood 2014), used as a hash of the counters.
 """
 
+from functools import cache
+from typing import Any
+
 import numpy as np
+
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
 
@@ -13,11 +19,37 @@ _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _STREAM = np.uint64(0xD1B54A32D192ED03)
 
 
-def _mix(x: Array) -> Array:
+# numba turns uint64 beside int64 into float64
+_ONE, _11, _27, _30, _31 = (np.uint64(n) for n in (1, 11, 27, 30, 31))
+_FACTOR_1, _FACTOR_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+
+
+@stage
+def _mix(x):
     """Finaliser of splitmix64: each bit of the input changes half of the output bits on average."""
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
+    x = (x ^ (x >> _30)) * _FACTOR_1
+    x = (x ^ (x >> _27)) * _FACTOR_2
+    return x ^ (x >> _31)
+
+
+@cache
+def _make_draw() -> Any:
+    sources = SOURCES
+
+    @entry
+    def draw(seeds, episodes, streams, out):
+        _ = sources
+        for i in range(out.shape[0]):
+            key = _mix(seeds[i] + _GOLDEN)
+            key = _mix(key + (episodes[i] + _ONE) * _GOLDEN)
+            if streams[i] != 0:
+                key = _mix(key + streams[i] * _STREAM)
+            step = key
+            for k in range(out.shape[1]):
+                step += _GOLDEN
+                out[i, k] = np.float64(_mix(step) >> _11) * 2.0**-53
+
+    return draw
 
 
 def uniform(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:
@@ -32,14 +64,10 @@ def uniform(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) 
     Returns:
         [n, count]
     """
-    key = _mix(seeds.astype(np.uint64) + _GOLDEN)
-    key = _mix(key + (episodes.astype(np.uint64) + np.uint64(1)) * _GOLDEN)
-    if np.any(stream):
-        streams = np.asarray(stream).astype(np.uint64)
-        key = np.where(streams == 0, key, _mix(key + streams * _STREAM))
-    steps = (np.arange(count, dtype=np.uint64) + np.uint64(1)) * _GOLDEN
-    bits = _mix(key[:, None] + steps)
-    return (bits >> np.uint64(11)) * 2.0**-53
+    out, streams = np.empty((len(seeds), count)), np.empty(len(seeds), dtype=np.uint64)
+    streams[:] = stream
+    _make_draw()(seeds.astype(np.uint64), episodes.astype(np.uint64), streams, out)
+    return out
 
 
 def normal(seeds: Array, episodes: Array, count: int, stream: int | Array = 0) -> Array:

@@ -53,6 +53,7 @@ class Randomization:
         self._ranges = np.tile(self._default, (count, 1, 1))
         values = np.concatenate([*(values[0] for values in self._scene_values), [0.0]])
         self._drawn = np.tile(values, (count, 1))
+        self.has_noise = False
         self._observed = [
             column for column, (name, _) in enumerate(self._columns()) if name in self.names
         ]
@@ -168,13 +169,9 @@ class Randomization:
         draws = uniform(seeds, episodes, ranges.shape[1], _PARAMETER_STREAM)
         drawn = ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * draws
         self._drawn[mask] = np.minimum(drawn, ranges[..., 1])  # round-off might exceed it
+        self._look_for_noise()
         if world.features.per_world_parameters:
             world.set_parameters(**self._split(self._drawn[mask]), worlds=mask)
-
-    @property
-    def has_noise(self) -> bool:
-        """Whether the controls of any world have noise."""
-        return bool(self._drawn[:, -1].any())
 
     def add_noise(self, actions: Array, seeds: Array, episodes: Array, steps: Array) -> Array:
         """Actions [count, actions] with the noise of each world's step [count]."""
@@ -203,3 +200,7 @@ class Randomization:
     def set_state(self, state: Mapping[str, Array]) -> None:
         """Restores ranges and drawn values from `get_state`."""
         self._ranges[:], self._drawn[:] = state["ranges"], state["drawn"]
+        self._look_for_noise()
+
+    def _look_for_noise(self) -> None:
+        self.has_noise = bool(self._drawn[:, -1].any())

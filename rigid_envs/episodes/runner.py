@@ -1,6 +1,5 @@
 """The runner: episodes of a task in any number of worlds. Both environments are built on it."""
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,8 +10,8 @@ from physics import Fidelity, Parameters, Snapshot, World
 from physics.compiler.jit import columns
 from physics.scene.validation import choice, instance
 from rigid_envs.episodes.arguments import argument_names, make_task
-from rigid_envs.episodes.bounds import clip, rows_of
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
+from rigid_envs.episodes.columns import clip_actions, split
 from rigid_envs.episodes.draws import uniform
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
@@ -226,13 +225,13 @@ class Runner:
             self.task.guide(self.world, now, achieved, desired, guide)
             if not self._observed:
                 check_written(self.task, "guide", self.task.guide_bounds, guide)
-        outside = clip(table, self._low, self._high, self.count)
-        self._goal_distance = distance(achieved, desired)
+        rows = split(table, self._low, self._high, desired)
+        self._goal_distance = rows.distance
         # one row per world, as users expect
         observation = {
-            "observation": rows_of(table, 0, goal_start, self.count),
-            "achieved_goal": rows_of(table, goal_start, len(table), self.count),
-            "desired_goal": desired.copy(),
+            "observation": rows.observation,
+            "achieved_goal": rows.achieved,
+            "desired_goal": rows.desired,
         }
         success: Array = self.reward.success(self._goal_distance)
         terms = self.task.terms(self.world, now, achieved, desired, self._goal_distance)
@@ -242,7 +241,7 @@ class Runner:
         info: dict[str, Array] = {
             "is_success": success,
             "success": success,
-            "out_of_bounds": outside,
+            "out_of_bounds": rows.outside,
             **terms,
         }
         if self.reward_type == "dense" and self.reward.task_terms:
@@ -257,14 +256,14 @@ class Runner:
         """
         shape = (self.count, len(self.task.actions))
         try:
-            array = np.asarray(actions, dtype=np.float64, order="F")
+            array = np.asarray(actions, dtype=np.float64, order="C")
         except (TypeError, ValueError):
             raise ValueError(f"action must be numbers of shape {shape}, got {actions!r}") from None
         if array.shape != shape:
             raise ValueError(f"action must have shape {shape}, got {array.shape}")
-        clipped = np.minimum(np.maximum(array, -1.0), 1.0)  # NaN stays NaN
-        if math.isnan(np.add.reduce(clipped, axis=None)):  # faster than checking every number
-            world, component = (int(i) for i in np.argwhere(np.isnan(array))[0])
+        clipped, missing = clip_actions(array)
+        if missing >= 0:
+            world, component = divmod(missing, shape[1])
             raise ValueError(
                 f"action must be numbers within [-1, 1], got NaN in world {world}, component "
                 f"{component} ({self.task.actions[component]})"

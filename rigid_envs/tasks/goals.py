@@ -18,7 +18,7 @@ Array = np.ndarray
 
 
 @stage
-def _goal_distance(a, b, i):
+def goal_distance(a, b, i):
     """Distance between the goals a[:, i] and b[:, i]."""
     largest, n = 0.0, a.shape[0]
     for point in range(0, n, 3):
@@ -39,7 +39,7 @@ def _make_distances() -> Any:
     def distances(a, b, out):
         _ = sources
         for i in range(out.shape[0]):
-            out[i] = _goal_distance(a, b, i)
+            out[i] = goal_distance(a, b, i)
 
     return distances
 
@@ -52,6 +52,6 @@ def distance(a: Any, b: Any) -> Any:
     n = a.shape[-1]
     rows_a, rows_b = (a, b) if a.ndim == 2 else (a.reshape(-1, n), b.reshape(-1, n))
     out = np.empty(len(rows_a))
-    columns = (np.ascontiguousarray(rows.T, dtype=np.float64) for rows in (rows_a, rows_b))
-    _make_distances()(*columns, out)
+    columns_a = np.ascontiguousarray(rows_a.T, dtype=np.float64)
+    _make_distances()(columns_a, np.ascontiguousarray(rows_b.T, dtype=np.float64), out)
     return out if a.ndim == 2 else out.reshape(a.shape[:-1])[()]

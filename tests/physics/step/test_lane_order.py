@@ -15,7 +15,6 @@ FIELDS = ("position", "orientation", "linear_velocity", "angular_velocity", "dri
 def scattered(fidelity, sort, monkeypatch):
     """Worlds in which the block lies, falls, or is pushed; sorted or not."""
     monkeypatch.setattr(lane_order, "_FEWEST_GROUPS", 1 if sort else 10**9)
-    monkeypatch.setattr(lane_order, "_LEAST_GAIN", 0.01)
     world, rng = World(scenes.push_like(), fidelity, COUNT, threads=2), np.random.default_rng(3)
     position = np.broadcast_to(world.position, (COUNT, *world.position.shape[1:])).copy()
     position[:, 0, 2] += np.where(rng.random(COUNT) < 0.5, rng.uniform(0.0, 0.3, COUNT), 0.0)
@@ -63,18 +62,19 @@ def test_groups_hold_worlds_with_the_same_half_pairs(monkeypatch):
     world, target = scattered("balanced", True, monkeypatch)
     run(world, target)
     simulation = world._simulation
-    lane_order.sort_worlds(simulation.model, simulation.state, 1)
-    state = simulation.state
-    sets = state.half_pair["count"] > 0
+    model, state = simulation.model, simulation.state
+    scratch = lane_order.Scratch.of(model, state)
+    lane_order.sort_worlds(model, state, scratch, 0, COUNT // LANES + 1)
+    counts = state.half_pair["count"]
 
-    def work(order):
-        """Half-pairs that groups work on: those that any of their worlds lists."""
-        groups = [order[n : n + LANES] for n in range(0, COUNT, LANES)]
-        return sum(int(sets[group].any(axis=0).sum()) for group in groups)
+    def empty(order):
+        """Lanes without a candidate, in the slots that groups work on."""
+        groups = [counts[order[n : n + LANES]] for n in range(0, COUNT, LANES)]
+        return sum(int((group.max(axis=0) - group).sum()) for group in groups)
 
-    sorted_work = work(state.resident[:COUNT])
-    assert sorted_work < 0.8 * work(np.arange(COUNT))
-    assert lane_order.sort_worlds(simulation.model, state, 1) == 0  # all are where they belong
+    assert empty(state.resident[:COUNT]) < 0.6 * empty(np.arange(COUNT))
+    # all are where they belong
+    assert lane_order.sort_worlds(model, state, scratch, 0, COUNT // LANES + 1) == 0
 
 
 def test_a_snapshot_taken_elsewhere_continues_bitwise(monkeypatch):

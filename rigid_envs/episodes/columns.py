@@ -1,0 +1,131 @@
+"""From the users' rows, one per world, to the columns of tasks and back, in one pass each.
+
+Tasks compute with columns, where NumPy's loops run over the worlds; users expect rows. What the
+runner does with every step, it does on the way: clipping, and distances to the goals.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics.compiler.code_cache import SOURCES
+from physics.compiler.jit import entry
+from rigid_envs.tasks.goals import goal_distance
+
+Array = np.ndarray
+
+_BLOCK = 64  # worlds; about 10 KB of rows
+
+
+class Observed(NamedTuple):
+    """What users and the runner take from a table of observations.
+
+    Attributes:
+        observation: [count, n] float32.
+        achieved: [count, goal] float32.
+        desired: [count, goal] float32.
+        distance: [count] m, between the two goals.
+        outside: [count] bool, whether any component of a world was clipped.
+    """
+
+    observation: Array
+    achieved: Array
+    desired: Array
+    distance: Array
+    outside: Array
+
+
+@cache
+def _make_split() -> Any:
+    sources = SOURCES
+
+    @entry
+    def split(table, low, high, goals, rows):
+        _ = sources
+        count, n = rows.distance.shape[0], rows.observation.shape[1]
+        achieved = table[n:]
+        for i in range(count):
+            rows.outside[i] = False
+        # a block's rows stay in the cache until its last column is written
+        for start in range(0, count, _BLOCK):
+            end = min(start + _BLOCK, count)
+            outside = rows.outside[start:end]
+            for c in range(table.shape[0]):
+                column, least, most = table[c, start:end], low[c], high[c]
+                beyond = 0
+                for i in range(len(column)):  # without a branch; most columns need only this loop
+                    beyond += (column[i] < least) | (column[i] > most)
+                if beyond > 0:
+                    for i in range(len(column)):
+                        if column[i] < least:
+                            column[i], outside[i] = least, True
+                        elif column[i] > most:
+                            column[i], outside[i] = most, True
+                if c < n:
+                    to = rows.observation[start:end, c]
+                    for i in range(len(column)):
+                        to[i] = column[i]
+                else:
+                    to, to_desired = rows.achieved[start:end, c - n], rows.desired[start:end, c - n]
+                    goal = goals[c - n, start:end]
+                    for i in range(len(column)):
+                        to[i] = column[i]
+                        to_desired[i] = goal[i]
+        for i in range(count):
+            rows.distance[i] = goal_distance(achieved, goals, i)
+
+    return split
+
+
+def split(table: Array, low: Array, high: Array, goals: Array) -> Observed:
+    """Clips a table of observations to their bounds, in place, and copies it into rows.
+
+    NaN stays NaN.
+
+    Args:
+        table: [n + goal, count or more] float32, C-contiguous; the achieved goals are last.
+        low: [n + goal] float32.
+        high: [n + goal] float32.
+        goals: [count, goal] float32, Fortran-contiguous: the desired ones.
+    """
+    count, goal = goals.shape
+    rows = Observed(
+        np.empty((count, len(low) - goal), dtype=np.float32),
+        np.empty((count, goal), dtype=np.float32),
+        np.empty((count, goal), dtype=np.float32),
+        np.empty(count),
+        np.empty(count, dtype=bool),
+    )
+    _make_split()(table, low, high, goals.T, rows)
+    return rows
+
+
+@cache
+def _make_clip_actions() -> Any:
+    sources = SOURCES
+
+    @entry
+    def clip_actions(rows, clipped):
+        _ = sources
+        count, n = rows.shape
+        for i in range(count):
+            for c in range(n):
+                value = rows[i, c]
+                if value != value:
+                    return i * n + c
+                clipped[c, i] = min(max(value, -1.0), 1.0)
+        return -1
+
+    return clip_actions
+
+
+def clip_actions(actions: Array) -> tuple[Array, int]:
+    """Actions [count, n], C-contiguous, clipped to [-1, 1], Fortran-contiguous.
+
+    Also the index of the first NaN in the flattened array, or -1 if there is none; with NaN, not
+    all actions are clipped.
+    """
+    columns = np.empty(actions.shape[::-1])
+    missing = int(_make_clip_actions()(actions, columns))
+    return columns.T, missing
