@@ -58,6 +58,7 @@ from physics.granular.tables import (
     STATUS,
     STEPS,
     TICKET,
+    TICKETS,
     VALID,
     HeapFeatures,
 )
@@ -67,14 +68,28 @@ from physics.model.features import cached_by_features
 SORT_AFTER = 30
 # The skin is adapted to how fast bodies move: a list should last for so many steps. With fewer
 # the search dominates; with more, pairs that don't touch
-_SHORT, _LONG = 8, 30
+_SHORT, _LONG = 16, 60
 _WIDER, _NARROWER = 1.25, 0.8
 
 
 @stage
-def take(scratch, region, threads):
-    """The next slab of a parallel region that no thread has taken; SLABS or more: none is left."""
-    return fetch_add(scratch.sync, TICKET, 1) - region * (SLABS + threads)
+def take(scratch, region, thread, threads, turn):
+    """The next slab of a parallel region that no thread has taken, and from whose share.
+
+    Each thread first takes its own share, the same in every region, which its cache holds; then
+    what is left of the others' shares. `turn` says how many shares are finished, 0 at first; if no
+    slab is left, it is the number of threads.
+    """
+    while turn < threads:
+        owner = (thread + turn) % threads
+        first, last = SLABS * owner // threads, SLABS * (owner + 1) // threads
+        # in each region every thread finds each share finished once
+        taken = fetch_add(scratch.sync, TICKET + TICKETS * owner, 1)
+        slab = first + taken - region * (last - first + threads)
+        if slab < last:
+            return slab, turn
+        turn += 1
+    return SLABS, turn
 
 
 @stage
@@ -135,8 +150,9 @@ def make_rebuild(features):
             scratch.result[NEEDED] = set_up_grid(heap, scratch)
         wait_for_all(scratch.sync, BARRIER, threads)
         cells = scratch.result[NEEDED]
+        turn = 0
         while True:
-            slab = take(scratch, region, threads)
+            slab, turn = take(scratch, region, thread, threads, turn)
             if slab >= SLABS:
                 break
             first, last = groups * slab // SLABS, groups * (slab + 1) // SLABS
@@ -161,20 +177,23 @@ def make_rebuild(features):
         wait_for_all(scratch.sync, BARRIER, threads)
         if any_bad(scratch):
             return DIVERGED
+        turn = 0
         while True:
-            slab = take(scratch, region + 1, threads)
+            slab, turn = take(scratch, region + 1, thread, threads, turn)
             if slab >= SLABS:
                 break
             count_particles(heap, scratch, slab, cells)
         wait_for_all(scratch.sync, BARRIER, threads)
+        turn = 0
         while True:
-            slab = take(scratch, region + 2, threads)
+            slab, turn = take(scratch, region + 2, thread, threads, turn)
             if slab >= SLABS:
                 break
             sort_particles(heap, scratch, slab, cells)
         wait_for_all(scratch.sync, BARRIER, threads)
+        turn = 0
         while True:
-            slab = take(scratch, region + 3, threads)
+            slab, turn = take(scratch, region + 3, thread, threads, turn)
             if slab >= SLABS:
                 break
             find_neighbors(heap, scratch, thread, slab, evaluation)
@@ -235,8 +254,9 @@ def make_advance(features: HeapFeatures) -> Any:
         evaluation = heap.counts[EVALUATION]
         while True:
             if not skip:
+                turn = 0
                 while True:
-                    slab = take(scratch, region, threads)
+                    slab, turn = take(scratch, region, thread, threads, turn)
                     if slab >= SLABS:
                         break
                     body_pass(heap, constants, scratch, states, thread, slab, what, h, evaluation)
@@ -259,8 +279,9 @@ def make_advance(features: HeapFeatures) -> Any:
                     region += 4
                 if status != DONE:
                     break
+            turn = 0
             while True:
-                slab = take(scratch, region, threads)
+                slab, turn = take(scratch, region, thread, threads, turn)
                 if slab >= SLABS:
                     break
                 pair_forces(

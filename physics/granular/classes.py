@@ -28,7 +28,7 @@ Array = np.ndarray
 # fraction of the radius below which particles count as at the same place
 _SAME = 1e-9
 # smallest and largest skin, in mean radii
-_SKINS = (0.1, 0.6)
+_SKINS = (0.1, 2.0)
 
 
 class Bodies(NamedTuple):

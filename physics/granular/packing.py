@@ -24,6 +24,8 @@ from physics.granular.tables import (
     SCALES,
     SKIN,
     SLABS,
+    TICKET,
+    TICKETS,
     VALID,
     WEIGHT,
     Constants,
@@ -72,7 +74,7 @@ def allocate(
         first=first,
         body_of=np.repeat(index.astype(np.int32), bodies.particles),
         level_of=_levels(bodies.points[:, 3])[0].astype(np.uint8),
-        local=bodies.points.copy(),
+        local=bodies.points[: bodies.particles[0] if bodies.equal else n].copy(),
         body=aligned_zeros(groups, BODY),
         particle=particle,
         motion=motion,
@@ -137,7 +139,7 @@ def _levels(radii: Array) -> tuple[Array, Array]:
 
 def scratch_for(heap: Heap, radii: Array, threads: int) -> Scratch:
     """Working memory of a heap."""
-    n = len(heap.local)
+    n = len(heap.particle)
     largest = _levels(radii)[1]
     level = np.zeros(len(largest), LEVEL)
     level["largest_radius"] = largest
@@ -158,7 +160,7 @@ def scratch_for(heap: Heap, radii: Array, threads: int) -> Scratch:
         total=np.zeros(SLABS, np.int64),
         wall_total=np.zeros(SLABS, np.int64),
         result=np.zeros(RESULTS, np.int64),
-        sync=aligned_zeros(64, np.dtype(np.int64)),
+        sync=aligned_zeros(TICKET + TICKETS * threads, np.dtype(np.int64)),
     )
 
 
@@ -239,7 +241,7 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
         first=first,
         body_of=np.repeat(np.arange(count, dtype=np.int32), counts),
         level_of=heap.level_of[particles],
-        local=heap.local[particles],
+        local=heap.local if bodies.equal else heap.local[particles],
         body=_sorted_rows(heap.body, places),
         particle=_sorted_particles(heap, particles),
         motion=motion,

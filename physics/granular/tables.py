@@ -117,7 +117,7 @@ class Heap(NamedTuple):
         first: [groups * LANES + 1] first particle of each place.
         body_of: [n] place of the body of each particle.
         level_of: [n] level of each particle in the grid.
-        local: [n, 4] x y z in the body's frame, and radius; m.
+        local: [n, 4] x y z in the body's frame, and radius; m. If all bodies are equal, of the first.
         body: [groups] of BODY.
         particle: [n, 4] x y z in the world, and radius; m.
         motion: [groups * LANES, MOTION] see CENTER.
@@ -175,8 +175,9 @@ MOST, ROTATION, LEAST_OF, MOST_OF, MOVES = 0, 1, 2, 5, 8
 STATUS, STEPS, NEEDED, REFRESH, RESULTS = range(5)
 # why a call returns
 DONE, SORT, MORE_PAIRS, MORE_WALLS, MORE_FORCES, DIVERGED = range(6)
-# elements of Scratch.sync: counters of the barrier and of slabs that have been taken
-BARRIER, TICKET = 0, 32
+# elements of Scratch.sync: counter of the barrier; and for each thread one of its slabs that have
+# been taken, TICKETS apart, so that each has a cache line
+BARRIER, TICKET, TICKETS = 0, 32, 8
 
 
 class Scratch(NamedTuple):
@@ -199,7 +200,7 @@ class Scratch(NamedTuple):
         total: [SLABS] particles in a range of cells; then pairs that a slab has found.
         wall_total: [SLABS] likewise pairs with statics.
         result: [RESULTS] see STATUS.
-        sync: [64] see BARRIER.
+        sync: [TICKET + TICKETS * threads] see BARRIER.
     """
 
     solid: Array

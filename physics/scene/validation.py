@@ -81,7 +81,9 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
         raise ValueError(f"{field} must be {size} numbers{names}, got {value!r}")
     if not np.all(np.isfinite(array)):
         raise ValueError(f"{field} must be finite, got {value!r}")
-    return tuple(float(x) for x in array)
+    # a million bodies at rest share their zeros
+    same = type(value) is tuple and all(type(x) is float for x in value)
+    return value if same else tuple(float(x) for x in array)
 
 
 def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
@@ -100,7 +102,7 @@ def unit_quaternion(field: str, value: Any) -> tuple[float, ...]:
     if abs(length - 1.0) < 1e-15:  # stays as it is, so that a saved one is read bit by bit
         length = 1.0
     length = math.copysign(length, quaternion[3]) if quaternion[3] != 0.0 else length
-    return tuple(x / length for x in quaternion)
+    return quaternion if length == 1.0 else tuple(x / length for x in quaternion)
 
 
 def text(field: str, value: Any) -> str:
