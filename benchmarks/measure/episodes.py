@@ -1,15 +1,19 @@
-"""Episodes of the environments with random actions, as sides of a comparison."""
+"""Episodes of the environments, as sides of a comparison."""
+
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from benchmarks.report.provenance import THREADS
+from benchmarks.report.provenance import ROOT, THREADS
 from benchmarks.report.timing import Side
 from physics import World
 from rigid_envs import Runner
+from rigid_envs.tasks import TASKS
+from training.policies.policy_file import PolicyFile, load_policy_file
 
 WORLDS = 4096
-EPISODE = 50  # environment steps
+EPISODE = 50  # environment steps with random actions
 
 Array = np.ndarray
 
@@ -19,25 +23,40 @@ def id_of(task: str) -> str:
     return f"RigidEnvs/{task.capitalize()}-v0"
 
 
-def vector_side(task: str, fidelity: str, worlds: int = WORLDS) -> Side:
-    """Each call is an episode of the vector environment, with the step that resets all worlds."""
+def policy_of(task: str) -> PolicyFile:
+    """The trained policy of a task that comes with the project."""
+    folder = ROOT / "results" / "ppo" / f"RigidEnvs-{task.capitalize()}-v0_seed0"
+    return load_policy_file(folder / "policy.policy")
+
+
+def vector_side(task: str, fidelity: str, worlds: int = WORLDS, trained: bool = False) -> Side:
+    """Each call is an episode of the vector environment, with the step that resets all worlds.
+
+    Actions are random; if `trained`, those that the trained policy takes from the seed that every
+    episode begins with. They are recorded once, so the policy's own time doesn't count.
+    """
+    policy = policy_of(task) if trained else None
+    arguments: dict[str, Any] = dict(policy.header.environment.kwargs) if policy else {}
+    arguments |= {"reward_type": "dense", "fidelity": fidelity}
+    steps = TASKS[task].max_episode_steps if policy else EPISODE
     envs = gym.make_vec(
-        id_of(task),
-        num_envs=worlds,
-        reward_type="dense",
-        fidelity=fidelity,
-        threads=THREADS,
-        max_episode_steps=EPISODE,
+        id_of(task), num_envs=worlds, threads=THREADS, max_episode_steps=steps, **arguments
     )
     size = envs.single_action_space.shape or ()
-    actions = np.random.default_rng(0).uniform(-1, 1, (EPISODE, worlds, *size)).astype(np.float32)
-    envs.reset(seed=0)
+    actions = np.random.default_rng(0).uniform(-1, 1, (steps, worlds, *size)).astype(np.float32)
+    observation = envs.reset(seed=0)[0]
+    for step in range(steps if policy else 0):
+        actions[step] = policy.act(observation)  # type: ignore[union-attr]
+        observation = envs.step(actions[step])[0]
 
     def episode() -> int:
+        if policy:
+            envs.reset(seed=0)
         for action in actions:
             envs.step(action)
-        envs.step(actions[0])  # resets all worlds; its time is measured, but it is not counted
-        return EPISODE * worlds
+        if not policy:
+            envs.step(actions[0])  # resets all worlds; its time is measured, but it is not counted
+        return steps * worlds
 
     return episode
 
@@ -59,22 +78,28 @@ def single_side(task: str, fidelity: str = "balanced") -> Side:
     return episode
 
 
-def random_episode(
-    task: str, worlds: int, fidelity: str = "balanced"
+def recorded_episode(
+    task: str, worlds: int, fidelity: str = "balanced", trained: bool = False
 ) -> tuple[World, Array, Array, Array]:
-    """One episode with random actions.
+    """One episode with random actions, or with those of the trained policy.
 
     Returns:
         The world at the end of the episode; the bodies' first positions [worlds, bodies, 3] in m
         and orientations [worlds, bodies, 4]; and the paths of the drives
-        [worlds, EPISODE + 1, drives, 3] in m.
+        [worlds, steps + 1, drives, 3] in m.
     """
-    runner, rng = Runner(task, worlds, "dense", fidelity, THREADS), np.random.default_rng(0)
+    policy = policy_of(task) if trained else None
+    arguments: dict[str, Any] = dict(policy.header.environment.kwargs) if policy else {}
+    arguments |= {"reward_type": "dense", "fidelity": fidelity}
+    runner, rng = Runner(task, worlds, threads=THREADS, **arguments), np.random.default_rng(0)
     runner.reset(np.ones(worlds, dtype=bool), np.arange(worlds))
-    world = runner.world
+    world, observation = runner.world, runner.observe()[0]
     position, orientation = world.position.copy(), world.orientation.copy()
     path = [world.drive_position.copy()]
-    for _ in range(EPISODE):
-        runner.step(rng.uniform(-1, 1, (worlds, len(runner.task.actions))))
+    for _ in range(TASKS[task].max_episode_steps if policy else EPISODE):
+        actions = rng.uniform(-1, 1, (worlds, len(runner.task.actions)))
+        if policy:
+            actions = policy.act(observation)
+        observation = runner.step(actions).observation
         path.append(world.drive_position.copy())
     return world, position, orientation, np.stack(path, axis=1)

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks.measure.episodes import WORLDS, random_episode, vector_side
+from benchmarks.measure.episodes import WORLDS, recorded_episode, vector_side
 from benchmarks.report.tables import Cell, Table
 from benchmarks.report.timing import clocked, rate
 from physics import PRESETS, World
@@ -23,7 +23,7 @@ def measure() -> Iterator[Table]:
         side = vector_side("push", preset)
         side()
         smallest, contacts = np.inf, 0
-        world = random_episode("push", CHECKED, preset)[0]
+        world = recorded_episode("push", CHECKED, preset)[0]
         for w in range(CHECKED):
             smallest = min(smallest, world.largest_stable_step(w))
             contacts += len(world.contacts(w).penetration)

@@ -40,11 +40,15 @@ def measure(
     rows: list[list[Cell]] = []
     for worlds in counts:
         with ExitStack() as children:
-            sides = {OURS: vector_side("push", "balanced", worlds), **mujoco_sides("push", worlds)}
+            sides = {
+                OURS: vector_side("push", "balanced", worlds, trained=True),
+                **mujoco_sides("push", worlds, trained=True),
+            }
             if panda_python and worlds in PANDA_COUNTS:
                 sides[PANDA] = children.enter_context(panda_side(panda_python, worlds))
             rates = take_turns(sides, rounds, seconds)
         medians = {name: statistics.median(values) for name, values in rates.items()}
         rows.append([f"{worlds:,}", *(medians.get(name) for name in names)])
     columns = ["worlds", *names]
-    yield Table("worlds", "Push, balanced: env steps per second by number of worlds", columns, rows)
+    title = "Push in the states of its trained policy: env steps per second by number of worlds"
+    yield Table("worlds", title, columns, rows)
