@@ -117,7 +117,7 @@ class Heap(NamedTuple):
         first: [groups * LANES + 1] first particle of each place.
         body_of: [n] place of the body of each particle.
         level_of: [n] level of each particle in the grid.
-        local: [n, 4] x y z in the body's frame, and radius; m. If all bodies are equal, of the first.
+        local: [n, 4] x y z in the body's frame, and radius; m. Of one body if all are equal.
         body: [groups] of BODY.
         particle: [n, 4] x y z in the world, and radius; m.
         motion: [groups * LANES, MOTION] see CENTER.
