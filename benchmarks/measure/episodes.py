@@ -45,9 +45,10 @@ def vector_side(task: str, fidelity: str, worlds: int = WORLDS, trained: bool = 
     size = envs.single_action_space.shape or ()
     actions = np.random.default_rng(0).uniform(-1, 1, (steps, worlds, *size)).astype(np.float32)
     observation = envs.reset(seed=0)[0]
-    for step in range(steps if policy else 0):
-        actions[step] = policy.act(observation)  # type: ignore[union-attr]
-        observation = envs.step(actions[step])[0]
+    if policy:
+        for step in range(steps):
+            actions[step] = policy.act(observation)
+            observation = envs.step(actions[step])[0]
 
     def episode() -> int:
         if policy:
@@ -97,9 +98,10 @@ def recorded_episode(
     position, orientation = world.position.copy(), world.orientation.copy()
     path = [world.drive_position.copy()]
     for _ in range(TASKS[task].max_episode_steps if policy else EPISODE):
-        actions = rng.uniform(-1, 1, (worlds, len(runner.task.actions)))
         if policy:
             actions = policy.act(observation)
+        else:
+            actions = rng.uniform(-1, 1, (worlds, len(runner.task.actions)))
         observation = runner.step(actions).observation
         path.append(world.drive_position.copy())
     return world, position, orientation, np.stack(path, axis=1)

@@ -1,8 +1,8 @@
 """Environment steps per second of Push against the number of worlds, with MuJoCo and panda-gym.
 
 All sides use two threads and take turns; figures are medians over the rounds. MuJoCo is physics
-alone (peers/mujoco_rollout.py). panda-gym runs one world by gym.make, several by Gymnasium's
-AsyncVectorEnv with one process per world.
+alone (peers/mujoco_rollout.py), led along the same paths. panda-gym has random actions; it runs one
+world by gym.make, several by Gymnasium's AsyncVectorEnv with one process per world.
 """
 
 import statistics

@@ -2,8 +2,9 @@
 
 A step has two parts that run in parallel: the forces between particles, slab by slab of pairs, and
 the motion of bodies, slab by slab of bodies. Between them the threads wait for each other. Each
-thread takes the next slab that none has taken. All threads read the same numbers, so they agree on
-what comes next without talking to each other; thread 0 writes those that belong to all.
+thread takes the slabs of its own share, then what is left of the others'. All threads read the same
+numbers, so they agree on what comes next without talking to each other; thread 0 writes those that
+belong to all.
 
 A kernel can't allocate. Where a list has no room it returns, the caller makes room and calls it
 again: it continues where it stopped.

@@ -37,10 +37,28 @@ _FEWEST_GROUPS = 8
 _FEW_EMPTY = 1 / 8
 # slots that a moved world must save, on average: moving it costs as much
 _LEAST_GAIN = 0.1
-# bits of a key for the place, and for the number of candidates; the others are for the half-pairs
-_BITS = 8
-_PLACE = (1 << _BITS) - 1
-_HALF_PAIR_BITS = 63 - 2 * _BITS
+# of a key: bits of the place, and of the number of candidates; the others are for the half-pairs
+_PLACE_BITS, _NUMBER_BITS = (_WINDOW * LANES - 1).bit_length(), 8
+_PLACE, _MOST = (1 << _PLACE_BITS) - 1, (1 << _NUMBER_BITS) - 1
+_HALF_PAIR_BITS = 63 - _PLACE_BITS - _NUMBER_BITS
+
+
+class Candidates(NamedTuple):
+    """Candidates of some lane groups.
+
+    Attributes:
+        values: [groups, slots, columns, LANES].
+        ids: [groups, slots, LANES] of their samples.
+    """
+
+    values: Array
+    ids: Array
+
+    @classmethod
+    def of(cls, candidate: Array, ids: Array) -> "Candidates":
+        """Rows [groups, slots] of CANDIDATE, as numbers."""
+        columns = candidate.dtype.itemsize // (8 * LANES)
+        return cls(candidate.view(np.float64).reshape(*candidate.shape, columns, LANES), ids)
 
 
 class Scratch(NamedTuple):
@@ -51,15 +69,14 @@ class Scratch(NamedTuple):
         ordered: [places] keys in order, each with its place.
         source: [places] the place from which a place gets its world.
         counts: [places, half-pairs] candidates.
-        candidates: values [1, slots, columns, LANES] and samples [1, slots, LANES] of a world, in
-            the first lane.
+        candidates: of one world, in the first lane of one group.
     """
 
     key: Array
     ordered: Array
     source: Array
     counts: Array
-    candidates: tuple[Array, Array]
+    candidates: Candidates
 
     @classmethod
     def of(cls, model: Model, state: State) -> "Scratch":
@@ -69,12 +86,13 @@ class Scratch(NamedTuple):
         counts = np.zeros((places, len(model.half_pair)), dtype=np.int64)
         candidate = np.zeros((1, slots), dtype=state.candidate.dtype)
         ids = np.zeros((1, slots, LANES), dtype=state.sample_id.dtype)
-        return cls(key, ordered, source, counts, (_columns(candidate), ids))
+        return cls(key, ordered, source, counts, Candidates.of(candidate, ids))
 
 
-def can_sort(features: Features, count: int) -> bool:
+def can_sort(model: Model, features: Features, count: int) -> bool:
     """Whether worlds may change their lanes: with per-world parameters these would have to move."""
-    return not features.per_world_parameters and count >= _FEWEST_GROUPS * LANES
+    enough = count >= _FEWEST_GROUPS * LANES and len(model.half_pair) > 0
+    return enough and not features.per_world_parameters
 
 
 def sort_worlds(model: Model, state: State, scratch: Scratch, first: int, last: int) -> int:
@@ -82,15 +100,10 @@ def sort_worlds(model: Model, state: State, scratch: Scratch, first: int, last: 
 
     Returns the number of worlds that moved.
     """
-    candidates = _columns(state.candidate), state.sample_id
-    first_slot = model.half_pair["first_slot"]
+    candidates = Candidates.of(state.candidate, state.sample_id)
+    first_slot = model.half_pair["first_slot"].copy()  # an entry relies on one memory layout
     arrays = state.half_pair, first_slot, state.place, state.resident, candidates, scratch
-    return int(_make_sort()(*arrays, first, last))
-
-
-def _columns(candidate: Array) -> Array:
-    """Rows [groups, slots] of CANDIDATE as numbers [groups, slots, columns, LANES]."""
-    return candidate.view(np.float64).reshape(*candidate.shape, -1, LANES)
+    return int(make_sort()(*arrays, first, last))
 
 
 @stage
@@ -127,16 +140,16 @@ def _find_sources(scratch, n):
     """Writes from which place each place gets its world; returns how many get another one."""
     key, ordered, source = scratch.key, scratch.ordered, scratch.source
     for j in range(n):
-        ordered[j] = key[j] << _BITS | j
+        ordered[j] = key[j] << _PLACE_BITS | j
     _sort(ordered, n)
     moved, other = 0, 0
     for j in range(n):
         source[j] = j
-        if ordered[j] >> _BITS == key[j]:
+        if ordered[j] >> _PLACE_BITS == key[j]:
             continue
         # the next world, in order of its key, that isn't where its key belongs
         place = ordered[other] & _PLACE
-        while ordered[place] >> _BITS == key[place]:
+        while ordered[place] >> _PLACE_BITS == key[place]:
             other += 1
             place = ordered[other] & _PLACE
         source[j] = place
@@ -150,18 +163,17 @@ def _copy(first_slot, counts, old, source, g, i, target, h, j):
     """Copies the candidates of lane i of group g to lane j of group h.
 
     `first_slot` and `counts` [half-pairs] say where they are, `old` how many lane j had until now:
-    those that aren't overwritten are cleared. `source` and `target` are values [groups, slots,
-    columns, LANES] and samples [groups, slots, LANES].
+    those that aren't overwritten are cleared.
     """
     for k in range(counts.shape[0]):
         end = first_slot[k] + counts[k]
         for s in range(first_slot[k], end):
-            for c in range(source[0].shape[2]):
-                target[0][h, s, c, j] = source[0][g, s, c, i]
-            target[1][h, s, j] = source[1][g, s, i]
+            for c in range(source.values.shape[2]):
+                target.values[h, s, c, j] = source.values[g, s, c, i]
+            target.ids[h, s, j] = source.ids[g, s, i]
         for s in range(end, first_slot[k] + old[k]):
-            for c in range(source[0].shape[2]):
-                target[0][h, s, c, j] = 0.0
+            for c in range(source.values.shape[2]):
+                target.values[h, s, c, j] = 0.0
 
 
 @stage
@@ -191,7 +203,7 @@ def _move(first_slot, place, resident, candidates, scratch, base, n):
 
 
 @cache
-def _make_sort() -> Any:
+def make_sort() -> Any:
     """Entry point of `sort_worlds`."""
     sources = SOURCES
 
@@ -210,7 +222,7 @@ def _make_sort() -> Any:
                     counts[j, k] = found
                     listed |= (1 if found > 0 else 0) << (k % _HALF_PAIR_BITS)
                     candidates_here += found
-                key[j] = listed << _BITS | min(candidates_here, _PLACE)
+                key[j] = listed << _NUMBER_BITS | min(candidates_here, _MOST)
                 scratch.source[j] = j
                 total += candidates_here
             slots = _slots(scratch, n)

@@ -28,7 +28,7 @@ from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.solids import Body
 from physics.step.adaptive_steps import make_adaptive_advance
-from physics.step.lane_order import PAUSE, Scratch, can_sort, sort_worlds
+from physics.step.lane_order import PAUSE, Scratch, can_sort, make_sort, sort_worlds
 from physics.step.readout import WIDTH, Readout, make_readout
 from physics.step.threads import run_in_blocks
 from physics.step.time_layers import make_advance, substep_count
@@ -236,9 +236,12 @@ class Simulation:
         model, state, table = self.model, self.state, self._table
         collision_substeps = self.fidelity.collision_substeps
         groups, idle, scratches = -(-self.count // LANES), self._idle, self._scratches
-        self._calls_to_sort -= 1
-        sort = substeps > 0 and self._calls_to_sort <= 0 and can_sort(self.features, self.count)
-        moved = []
+        self._calls_to_sort -= 1 if substeps > 0 else 0
+        sort = substeps > 0 and self._calls_to_sort <= 0
+        sort = sort and can_sort(model, self.features, self.count)
+        if sort:
+            make_sort()  # once, before several threads ask for it
+        moved: list[int] = []
 
         def run(first: int, last: int) -> Any:
             try:

@@ -1,7 +1,7 @@
 """From the users' rows, one per world, to the columns of tasks and back, in one pass each.
 
 Tasks compute with columns, where NumPy's loops run over the worlds; users expect rows. What the
-runner does with every step, it does on the way: clipping, and distances to the goals.
+runner does with every step, it does on the way: clipping.
 """
 
 from functools import cache
@@ -11,7 +11,6 @@ import numpy as np
 
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
-from rigid_envs.tasks.goals import goal_distance
 
 Array = np.ndarray
 
@@ -25,14 +24,12 @@ class Observed(NamedTuple):
         observation: [count, n] float32.
         achieved: [count, goal] float32.
         desired: [count, goal] float32.
-        distance: [count] m, between the two goals.
         outside: [count] bool, whether any component of a world was clipped.
     """
 
     observation: Array
     achieved: Array
     desired: Array
-    distance: Array
     outside: Array
 
 
@@ -43,8 +40,7 @@ def _make_split() -> Any:
     @entry
     def split(table, low, high, goals, rows):
         _ = sources
-        count, n = rows.distance.shape[0], rows.observation.shape[1]
-        achieved = table[n:]
+        count, n = rows.observation.shape
         for i in range(count):
             rows.outside[i] = False
         # a block's rows stay in the cache until its last column is written
@@ -72,8 +68,6 @@ def _make_split() -> Any:
                     for i in range(len(column)):
                         to[i] = column[i]
                         to_desired[i] = goal[i]
-        for i in range(count):
-            rows.distance[i] = goal_distance(achieved, goals, i)
 
     return split
 
@@ -94,7 +88,6 @@ def split(table: Array, low: Array, high: Array, goals: Array) -> Observed:
         np.empty((count, len(low) - goal), dtype=np.float32),
         np.empty((count, goal), dtype=np.float32),
         np.empty((count, goal), dtype=np.float32),
-        np.empty(count),
         np.empty(count, dtype=bool),
     )
     _make_split()(table, low, high, goals.T, rows)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from physics import World
+from physics import Body, Ground, Scene, Sphere, World
 from physics.compiler.jit import LANES
 from physics.reference import scenes
 from physics.step import lane_order
@@ -91,4 +91,26 @@ def test_a_snapshot_taken_elsewhere_continues_bitwise(monkeypatch):
 def test_worlds_with_their_own_parameters_stay_in_place(monkeypatch):
     monkeypatch.setattr(lane_order, "_FEWEST_GROUPS", 1)
     world = World(scenes.push_like(), count=2 * LANES, per_world_parameters=True)
-    assert not lane_order.can_sort(world._simulation.features, world.count)
+    simulation = world._simulation
+    assert not lane_order.can_sort(simulation.model, simulation.features, world.count)
+
+
+def test_scenes_with_one_half_pair_with_many_and_with_none_in_one_process():
+    """The kernel is compiled for the first of them."""
+    count, ball = 8 * LANES, Body(Sphere(0.1), mass=1.0, position=(0, 0, 1))
+    for scene in (
+        Scene(bodies=[ball]),
+        Scene(bodies=[ball], statics=[Ground()]),
+        scenes.push_like(),
+    ):
+        world = World(scene, count=count, threads=2)
+        rng = np.random.default_rng(0)
+        position = np.broadcast_to(world.position, (count, len(scene.bodies), 3)).copy()
+        position[:, 0, 2] += np.where(rng.random(count) < 0.5, 0.0, 0.3)
+        world.set_state(position=position)
+        alone = World(scene, count=1)
+        alone.set_state(position=position[-1:])
+        for _ in range(12):
+            world.advance(0.02)
+            alone.advance(0.02)
+        np.testing.assert_array_equal(world.position[-1], alone.position[0])
