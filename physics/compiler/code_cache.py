@@ -6,6 +6,10 @@ sources of the engine: numba hashes closure cells, and an edit anywhere in the e
 miss. (A hash that ignores comments would cost every process 80 ms when it starts; this one costs
 2 ms.)
 
+Numba numbers the files of an entry by an index that it reads, changes and writes without a lock.
+Two processes could give the same number to kernels for different types, and one of them would later
+run the code of the other. So each file is named by a hash of the types that its kernel is for.
+
 Most of an entry's compile time goes into its stages, and most of these it has in common with other
 entries. They are cached here, as optimised bitcode that callers link. So a scene whose
 kernel is new compiles its entry, its sequences and those stages that no scene before it had.
@@ -28,7 +32,7 @@ from uuid import uuid4
 import llvmlite
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -51,6 +55,26 @@ _MADE_BY = repr((
     SOURCES, numba.__version__, llvmlite.__version__, np.__version__, platform.python_version(),
     [getattr(numba.config, name, None) for name in _SETTINGS],
 )).encode()  # fmt: skip
+
+
+class EntryFiles(IndexDataCacheFile):
+    """The files of an entry: an index, and one file for each kernel, named by its key."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Writes a kernel. If another process writes the index at once, one is compiled again."""
+        name = self._data_name(int(hashlib.sha256(repr(key).encode()).hexdigest()[:16], 16))
+        kernels = self._load_index()
+        if kernels.get(key) != name:
+            kernels[key] = name
+            self._save_index(kernels)
+        self._save_data(name, data)
+
+
+def name_files_by_key(entry: Any) -> None:
+    """Lets an entry that numba caches keep its kernels in `EntryFiles`."""
+    files = entry._cache._cache_file
+    base = files._index_name.removesuffix(".nbi")
+    entry._cache._cache_file = EntryFiles(files._cache_path, base, files._source_stamp)
 
 
 def is_cacheable(stage: Any) -> bool:

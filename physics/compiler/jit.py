@@ -24,6 +24,7 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
+from physics.compiler.code_cache import name_files_by_key
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 
 Array = np.ndarray
@@ -83,6 +84,7 @@ def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return _on_records(function)
     compiled = njit(cache=True, nogil=True, pipeline_class=EntryPipeline, **_OPTIONS)(function)
+    name_files_by_key(compiled)
     direct: list[Any] = []
     first_call = threading.Lock()  # other threads wait, so a compilation is logged once
 
