@@ -86,8 +86,9 @@ class World:
         elif is_crowd(scene, self.fidelity, per_world_parameters):
             crowd = CrowdSimulation(*arguments)
             self._simulation, self._queries = crowd, CrowdQueries(crowd)
+            check_integrator(scene, self.fidelity, crowd.base)
             if not allow_unstable:
-                check_crowd(scene, self.fidelity, crowd.kinds.of_solid)
+                check_crowd(scene, self.fidelity, crowd.kinds.of_solid, crowd.mechanisms.scenes)
         else:
             self._simulation = Simulation(*arguments)
             self._queries = LaneQueries(self._simulation)

@@ -48,6 +48,7 @@ def make_clear(features):
 def make_add_candidate(features):
     """Stage that writes a candidate into a slot, with the memory that its sample had before."""
     memory_size, impulse = contact_memory(features).size, features.impulse
+    hidden = features.box and features.compound
 
     @stage
     def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight):
@@ -59,6 +60,9 @@ def make_add_candidate(features):
         row.sample[1, i] = y
         row.sample[2, i] = z
         row.weight[i] = weight
+        for axis in range(3):
+            if hidden:  # the slot may have been that of another kind of pair
+                row.hidden_offset[axis, i] = 0.0
         for m in range(memory_size):
             row.memory[m, i] = old[cursor].memory[m] if known else 0.0
         if impulse:

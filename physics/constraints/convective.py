@@ -11,7 +11,7 @@ from physics.compiler.jit import LANES, stage
 from physics.constraints.rows import between_anchors
 from physics.model.features import cached_by_features
 from physics.model.tables import ALONG, ANGLE, DISTANCE, HIGH_LIMIT
-from physics.motion.vectors import cross, rotated
+from physics.motion.vectors import cross, rotated_at
 
 
 @stage
@@ -48,7 +48,7 @@ def _velocity_between(row, A, B, i):
 @stage
 def _along(row, A, B, i):
     dx, dy, dz, ex, ey, ez, fx, fy, fz = _velocity_between(row, A, B, i)
-    nx, ny, nz = rotated(B.rotation, i, row.axis_b[0], row.axis_b[1], row.axis_b[2])
+    nx, ny, nz = rotated_at(B.rotation, i, row.axis_b)
     s = B.angular_velocity
     mx, my, mz = cross(s[0, i], s[1, i], s[2, i], nx, ny, nz)
     kx, ky, kz = _centripetal(s, i, nx, ny, nz)
@@ -67,8 +67,8 @@ def _distance(row, A, B, i):
 
 @stage
 def _perpendicular(row, A, B, i):
-    ux, uy, uz = rotated(A.rotation, i, row.axis_a[0], row.axis_a[1], row.axis_a[2])
-    wx, wy, wz = rotated(B.rotation, i, row.axis_b[0], row.axis_b[1], row.axis_b[2])
+    ux, uy, uz = rotated_at(A.rotation, i, row.axis_a)
+    wx, wy, wz = rotated_at(B.rotation, i, row.axis_b)
     o, s = A.angular_velocity, B.angular_velocity
     px, py, pz = _centripetal(o, i, ux, uy, uz)
     qx, qy, qz = _centripetal(s, i, wx, wy, wz)
@@ -80,7 +80,7 @@ def _perpendicular(row, A, B, i):
 
 @stage
 def _angle(row, A, B, i):
-    zx, zy, zz = rotated(B.rotation, i, row.pivot[0], row.pivot[1], row.pivot[2])
+    zx, zy, zz = rotated_at(B.rotation, i, row.pivot)
     o, s = A.angular_velocity, B.angular_velocity
     x, y, z = cross(s[0, i], s[1, i], s[2, i], zx, zy, zz)
     return (o[0, i] - s[0, i]) * x + (o[1, i] - s[1, i]) * y + (o[2, i] - s[2, i]) * z

@@ -21,7 +21,7 @@ kick that follows.
 
 import math
 
-from physics.compiler.jit import LANES, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.constraints.convective import make_convective_rates
 from physics.constraints.envelope import factor, solve
 from physics.constraints.joint_drift import write_world_frame
@@ -42,10 +42,9 @@ def _start(model, state, workspace, h):
     for r in range(model.joint_row.shape[0]):
         row, work = model.joint_row[r], workspace.joint[r]
         bounded += 0 if row.role == EQUALITY else 1
-        margin = TOUCHED * row.scale
-        # a motor's velocity is reached within a substep: more than that would overshoot
-        frequency = min(row.frequency, HIGHEST_SERVO / h)
         for i in range(LANES):
+            low, high = at(row.limits[0], i), at(row.limits[1], i)
+            margin = TOUCHED * at(row.scale, i)
             work.force[i] = 0.0
             work.rate[i] = 0.0
             work.active[i] = 1
@@ -54,13 +53,15 @@ def _start(model, state, workspace, h):
                 rate = 0.0
                 if w >= 0:
                     rate = state.motor[w, row.motor, 0]
-                    aim = state.motor[w, row.motor, 1] - row.middle
-                    left = min(max(aim, row.limits[0]), row.limits[1]) - work.value[i]
-                    if row.kind == ANGLE and row.limits[1] == math.inf:  # the shorter way
+                    aim = state.motor[w, row.motor, 1] - at(row.middle, i)
+                    left = min(max(aim, low), high) - work.value[i]
+                    if row.kind == ANGLE and high == math.inf:  # the shorter way
                         left -= 2.0 * math.pi * math.floor(left / (2.0 * math.pi) + 0.5)
+                    # its velocity is reached within a substep: more than that would overshoot
+                    frequency = min(at(row.frequency, i), HIGHEST_SERVO / h)
                     rate = frequency * left if aim == aim else rate  # NaN: no servo
-                rate = max(rate, 0.0) if work.value[i] <= row.limits[0] + margin else rate
-                rate = min(rate, 0.0) if work.value[i] >= row.limits[1] - margin else rate
+                rate = max(rate, 0.0) if work.value[i] <= low + margin else rate
+                rate = min(rate, 0.0) if work.value[i] >= high - margin else rate
                 work.rate[i] = rate
             elif row.role != EQUALITY:
                 work.active[i] = 1 if work.value[i] <= margin else 0
@@ -107,10 +108,10 @@ def bound_changes(model, workspace, per_force):
         row, work = model.joint_row[r], workspace.joint[r]
         if row.role == EQUALITY:
             continue
-        low, high = (-per_force * row.force_limit, per_force * row.force_limit)
         for i in range(LANES):
+            most = per_force * at(row.force_limit, i)
             new = work.force[i] + work.change[i]
-            bound = max(new, 0.0) if row.role != MOTOR else min(max(new, low), high)
+            bound = max(new, 0.0) if row.role != MOTOR else min(max(new, -most), most)
             out = (bound != new) & (work.active[i] != 0)
             work.active[i] = 0 if out else work.active[i]
             work.change[i] = bound - work.force[i] if out else work.change[i]

@@ -64,7 +64,7 @@ def make_begin_hold(features):
                         work.allowed[i] = 1 if motor_time > 0.0 else 0
                         work.aim[i] = work.rate[i]
                     elif row.role != EQUALITY:
-                        touched = work.value[i] <= TOUCHED * row.scale
+                        touched = work.value[i] <= TOUCHED * at(row.scale, i)
                         work.allowed[i] = 1 if limits and touched else 0
                         work.aim[i] = 0.0
 

@@ -107,7 +107,7 @@ def _fail(model, workspace):
         position = workspace.solid[row.a].position
         for i in range(LANES):
             far = abs(position[0, i]) + abs(position[1, i]) + abs(position[2, i])
-            holds = abs(work.value[i]) <= FAILED * (row.scale + far)
+            holds = abs(work.value[i]) <= FAILED * (at(row.scale, i) + far)
             if unconverged[i] != 0 and row.role == EQUALITY and not holds:
                 momentum[0, i] = math.nan
                 unconverged[i] = 0

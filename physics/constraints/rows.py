@@ -19,14 +19,14 @@ import math
 
 from physics.compiler.jit import LANES, at, stage
 from physics.model.tables import ALONG, DISTANCE, HIGH_LIMIT, MOTOR, PERPENDICULAR
-from physics.motion.vectors import cross, rotated, rotated_back
+from physics.motion.vectors import cross, rotated, rotated_at, rotated_back
 
 
 @stage
 def between_anchors(row, A, B, i):
     """Arms of both anchors from the centres, and the vector from that of b to that of a, m."""
-    ax, ay, az = rotated(A.rotation, i, row.point_a[0], row.point_a[1], row.point_a[2])
-    bx, by, bz = rotated(B.rotation, i, row.point_b[0], row.point_b[1], row.point_b[2])
+    ax, ay, az = rotated_at(A.rotation, i, row.point_a)
+    bx, by, bz = rotated_at(B.rotation, i, row.point_b)
     a, b = A.position, B.position
     dx = a[0, i] - b[0, i] + (ax - bx)
     dy = a[1, i] - b[1, i] + (ay - by)
@@ -37,7 +37,7 @@ def between_anchors(row, A, B, i):
 @stage
 def _along(row, A, B, i):
     ax, ay, az, bx, by, bz, dx, dy, dz = between_anchors(row, A, B, i)
-    nx, ny, nz = rotated(B.rotation, i, row.axis_b[0], row.axis_b[1], row.axis_b[2])
+    nx, ny, nz = rotated_at(B.rotation, i, row.axis_b)
     sx, sy, sz = cross(ax, ay, az, nx, ny, nz)
     # the axis rotates with b, so its arm ends at the anchor of a
     tx, ty, tz = cross(bx + dx, by + dy, bz + dz, nx, ny, nz)
@@ -57,17 +57,17 @@ def _distance(row, A, B, i):
 
 @stage
 def _perpendicular(row, A, B, i):
-    ux, uy, uz = rotated(A.rotation, i, row.axis_a[0], row.axis_a[1], row.axis_a[2])
-    wx, wy, wz = rotated(B.rotation, i, row.axis_b[0], row.axis_b[1], row.axis_b[2])
+    ux, uy, uz = rotated_at(A.rotation, i, row.axis_a)
+    wx, wy, wz = rotated_at(B.rotation, i, row.axis_b)
     sx, sy, sz = cross(ux, uy, uz, wx, wy, wz)
     return 0.0, 0.0, 0.0, sx, sy, sz, sx, sy, sz, ux * wx + uy * wy + uz * wz
 
 
 @stage
 def _angle(row, A, B, i):
-    ux, uy, uz = rotated(A.rotation, i, row.axis_a[0], row.axis_a[1], row.axis_a[2])
-    wx, wy, wz = rotated(B.rotation, i, row.axis_b[0], row.axis_b[1], row.axis_b[2])
-    zx, zy, zz = rotated(B.rotation, i, row.pivot[0], row.pivot[1], row.pivot[2])
+    ux, uy, uz = rotated_at(A.rotation, i, row.axis_a)
+    wx, wy, wz = rotated_at(B.rotation, i, row.axis_b)
+    zx, zy, zz = rotated_at(B.rotation, i, row.pivot)
     tx, ty, tz = cross(zx, zy, zz, wx, wy, wz)
     angle = math.atan2(ux * tx + uy * ty + uz * tz, ux * wx + uy * wy + uz * wz)
     return 0.0, 0.0, 0.0, zx, zy, zz, zx, zy, zz, angle
@@ -81,7 +81,7 @@ def _make_measure(formula):
         target, sign = row.target, -1.0 if row.role == HIGH_LIMIT else 1.0
         for i in range(LANES):
             value = formula(row, A, B, i)[9]
-            work.value[i] = sign * (value - target)
+            work.value[i] = sign * (value - at(target, i))
 
     return measure
 
@@ -94,7 +94,7 @@ def _make_linearise(formula):
         target, sign = row.target, -1.0 if row.role == HIGH_LIMIT else 1.0
         for i in range(LANES):
             nx, ny, nz, sx, sy, sz, tx, ty, tz, value = formula(row, A, B, i)
-            work.value[i] = sign * (value - target)
+            work.value[i] = sign * (value - at(target, i))
             work.direction[0, i] = sign * nx
             work.direction[1, i] = sign * ny
             work.direction[2, i] = sign * nz

@@ -2,7 +2,7 @@
 
 import math
 
-from physics.compiler.jit import LANES, stage
+from physics.compiler.jit import LANES, at, stage
 from physics.constraints.envelope import solve
 from physics.constraints.rows import add_along_row
 from physics.model.tables import EQUALITY, MOTOR
@@ -36,7 +36,7 @@ def find_violations(model, workspace, tolerance):
         position = workspace.solid[row.a].position
         for i in range(LANES):
             far = abs(position[0, i]) + abs(position[1, i]) + abs(position[2, i])
-            C, size = work.value[i], row.scale + far
+            C, size = work.value[i], at(row.scale, i) + far
             most = tolerance * size
             if row.role == EQUALITY:
                 violated = not abs(C) <= most  # NaN counts

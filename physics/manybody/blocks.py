@@ -1,8 +1,13 @@
-"""Blocks of bodies: LANES bodies side by side move as the bodies of a lane group do."""
+"""Body groups: LANES bodies, or LANES mechanisms of the same structure, side by side.
+
+The stages of a lane group move them as the bodies of LANES small worlds.
+"""
 
 import math
 
 from physics.compiler.jit import LANES, sequence, stage
+from physics.constraints.joint_drift import make_joint_drift
+from physics.constraints.joint_forces import make_joint_forces
 from physics.impulse.point_impulses import world_tensor
 from physics.integrators.drift import make_drift
 from physics.integrators.kick import make_kick
@@ -14,25 +19,29 @@ from physics.manybody.tables import (
     ROTATION_BOUND,
     VELOCITY,
 )
-from physics.model.features import cached_by_features
+from physics.model.features import EULER, cached_by_features
+from physics.model.state import State
 from physics.model.tables import Model
 from physics.model.workspace import Workspace
+from physics.motion.drives import make_drives, make_finger_coupling
+from physics.motion.fields import make_fields, make_present_velocities
 from physics.motion.gravity import gravity
 from physics.motion.kinematics import make_kinematics
 
 
 @stage
-def block_model(model, crowd, m):
-    """Block m as the only dynamic body, with constants of its own in every lane."""
+def group_model(model, crowd, g):
+    """The bodies of group g as the only dynamic ones, with constants of their own in every lane."""
+    group = crowd.group[g]
     return Model(
-        crowd.constants[m : m + 1],
+        crowd.constants[group.first_block : group.first_block + group.block_count],
         model.half_pair,
         model.compound_part,
         model.hidden_face,
         model.static,
         model.sample,
-        model.field,
-        model.joint_row,
+        model.field[group.first_field : group.first_field + group.field_count],
+        model.joint_row[group.first_joint : group.first_joint + group.joint_count],
         model.grid,
         model.grid_value,
         model.surface_point,
@@ -40,10 +49,14 @@ def block_model(model, crowd, m):
 
 
 @stage
-def block_workspace(workspace, crowd, m):
-    """The same, of the working memory."""
+def group_workspace(workspace, crowd, g):
+    """The same, of the working memory; marks the lanes that hold bodies of the scene."""
+    group, lane = crowd.group[g], workspace.lane[0]
+    for i in range(LANES):
+        lane.world[i] = i if crowd.present[g, i] != 0 else -1
+        lane.active[i] = crowd.present[g, i]
     return Workspace(
-        crowd.solid[m : m + 1],
+        crowd.solid[group.first_block : group.first_block + group.solid_count],
         workspace.relative,
         workspace.half_pair,
         workspace.lane,
@@ -53,14 +66,32 @@ def block_workspace(workspace, crowd, m):
         workspace.tensor,
         workspace.contact_row,
         workspace.manifold,
-        workspace.joint,
-        workspace.joint_factor,
+        crowd.joint[group.first_joint : group.first_joint + group.joint_count],
+        crowd.joint_factor[group.first_entry : group.first_entry + group.entry_count],
         workspace.start,
         workspace.trial,
         workspace.pace,
         workspace.timing,
         workspace.clock,
         workspace.kept,
+    )
+
+
+@stage
+def group_state(state, crowd, g):
+    """The state with the motors of group g as those of LANES worlds."""
+    return State(
+        state.dynamic,
+        state.half_pair,
+        state.touch,
+        state.world,
+        state.sample_id,
+        state.candidate,
+        state.wrench,
+        crowd.motor[g * LANES : (g + 1) * LANES],
+        state.pace,
+        state.place,
+        state.resident,
     )
 
 
@@ -96,51 +127,115 @@ def count_far(crowd, m):
     return far
 
 
+@stage
+def blocks_of(crowd, g):
+    """The blocks of a group's bodies."""
+    first = crowd.group[g].first_block
+    return range(first, first + crowd.group[g].block_count)
+
+
 @cached_by_features
-def make_move_block(features):
-    """Sequence of the first half of a substep: momenta change, bodies move; `count_far`."""
-    kick, drift, kinematics = make_kick(features), make_drift(features), make_kinematics(features)
+def make_move_group(features):
+    """Sequence of the first half of a substep: momenta change, bodies move.
+
+    Returns how many bodies are about to leave their margin, see `count_far`.
+    """
+    kick, kinematics, drift = make_kick(features), make_kinematics(features), make_drift(features)
+    joints, joint_drift = features.joints, make_joint_drift(features)
 
     @sequence
-    def move_block(model, workspace, crowd, m, before, h):
-        own, mine = block_model(model, crowd, m), block_workspace(workspace, crowd, m)
+    def move_group(model, workspace, crowd, g, before, h):
+        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
         kick(own, mine, before)
-        drift(own, mine, h)
+        if joints and crowd.group[g].joint_count > 0:
+            joint_drift(own, mine, h)
+        else:
+            drift(own, mine, h)
         kinematics(own, mine)
-        write_frames(crowd, m)
-        return count_far(crowd, m)
+        far = 0
+        for m in blocks_of(crowd, g):
+            write_frames(crowd, m)
+            far += count_far(crowd, m)
+        return far
 
-    return move_block
+    return move_group
 
 
 @cached_by_features
-def make_place_block(features):
-    """Sequence that writes the frames of a block at rest: for a refresh."""
+def make_place_group(features):
+    """Sequence that writes the frames of a group at rest: for a refresh."""
     kinematics = make_kinematics(features)
 
     @sequence
-    def place_block(model, workspace, crowd, m):
-        solid = crowd.solid[m]
-        for i in range(LANES):
-            for c in range(3):
-                solid.displacement[c, i] = 0.0
-            solid.rotation_bound[i] = 0.0
-        kinematics(block_model(model, crowd, m), block_workspace(workspace, crowd, m))
-        write_frames(crowd, m)
+    def place_group(model, workspace, crowd, g):
+        for m in blocks_of(crowd, g):
+            solid = crowd.solid[m]
+            for i in range(LANES):
+                for c in range(3):
+                    solid.displacement[c, i] = 0.0
+                solid.rotation_bound[i] = 0.0
+        kinematics(group_model(model, crowd, g), group_workspace(workspace, crowd, g))
+        for m in blocks_of(crowd, g):
+            write_frames(crowd, m)
 
-    return place_block
+    return place_group
 
 
-@stage
-def known_forces(model, workspace, crowd, m):
-    """Weight and the user's wrenches."""
-    gravity(block_model(model, crowd, m), block_workspace(workspace, crowd, m))
-    force, torque = crowd.solid[m].force, crowd.solid[m].torque
-    if crowd.wrench.shape[0] > 0:
-        for i in range(LANES):
-            for c in range(3):
-                force[c, i] += crowd.wrench[m * LANES + i, c]
-                torque[c, i] += crowd.wrench[m * LANES + i, 3 + c]
+@cached_by_features
+def make_known_forces(features):
+    """Sequence of all forces but those of contacts and joints: weight, fields, user, servos."""
+    lag = 0.0 if features.integrator == EULER else 1.0
+    present_velocities, fields = make_present_velocities(features), make_fields(features)
+    drives = make_drives(features)
+
+    @sequence
+    def known_forces(model, workspace, crowd, g, drifted):
+        """The last drift took `drifted` s, 0 in a refresh."""
+        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        present_velocities(own, mine, lag * drifted)
+        gravity(own, mine)
+        fields(own, mine)
+        if crowd.wrench.shape[0] > 0:
+            for m in blocks_of(crowd, g):
+                force, torque = crowd.solid[m].force, crowd.solid[m].torque
+                for i in range(LANES):
+                    for c in range(3):
+                        force[c, i] += crowd.wrench[m * LANES + i, c]
+                        torque[c, i] += crowd.wrench[m * LANES + i, 3 + c]
+        drives(own, mine, drifted)
+
+    return known_forces
+
+
+@cached_by_features
+def make_hold_joints(features):
+    """Sequence that adds the forces of a group's joints."""
+    joints, joint_forces = features.joints, make_joint_forces(features)
+
+    @sequence
+    def hold_joints(model, state, workspace, crowd, g, h, drifted):
+        """Steps take `h` s, the last drift took `drifted` s."""
+        if joints and crowd.group[g].joint_count > 0:
+            own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+            joint_forces(own, group_state(state, crowd, g), mine, h, drifted)
+
+    return hold_joints
+
+
+@cached_by_features
+def make_end_step(features):
+    """Sequence of the second half of a substep: the fingers of grippers are one solid; a kick."""
+    couple_fingers, kick = make_finger_coupling(features), make_kick(features)
+
+    @sequence
+    def end_step(model, workspace, crowd, g, drifted, time):
+        """The last drift took `drifted` s, the kick takes `time` s."""
+        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        couple_fingers(own, mine, drifted)
+        if time > 0.0:
+            kick(own, mine, time)
+
+    return end_step
 
 
 @stage

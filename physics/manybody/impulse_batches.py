@@ -5,6 +5,7 @@ and copies them back. Batches of one colour share no body, so they may be worked
 and at once. Statics don't change, and are shared by all.
 """
 
+from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.jit import LANES, sequence, stage
 from physics.impulse.contact_rows import make_contact_rows
 from physics.impulse.point_impulses import operands_of
@@ -32,6 +33,15 @@ from physics.manybody.batches import (
 from physics.manybody.tables import ANGULAR_VELOCITY, VELOCITY
 from physics.model.features import cached_by_features
 from physics.model.lanes import update_previous
+
+
+@stage
+def batch_of(all_model, workspace, rows, crowd, pairs, b):
+    """The tables of batch b, and a thread's working memory with its contact rows."""
+    kind = crowd.pair_kind[pairs.kind[b]]
+    first_row, row_count = pairs.first_row[b], pairs.row_count[b]
+    mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+    return model_of(all_model, kind), mine
 
 
 @stage
@@ -95,20 +105,18 @@ def make_list_contacts(features):
 @cached_by_features
 def make_prepare_batch(features):
     """Sequence that writes the contact rows of a batch."""
-    contact_rows = make_contact_rows(features)
+    contact_rows, compound_frames = make_contact_rows(features), make_compound_frames(features)
 
     @sequence
     def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h, remembers):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
-        own = state_of(state, pairs, kind, b)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        own = state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b)
         mark_lanes(workspace.lane[0], pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], workspace.solid[0])
         gather_pose(crowd.frame, pairs.second[b], workspace.solid[1])
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
+        compound_frames(model, mine)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 contact_rows(model, own, mine, 0, k, workspace.lane[0].updates_memory, h)
@@ -121,16 +129,13 @@ def make_find_batch_impacts(features):
     """Sequence that notes the colliding points of a batch.
 
     Returns the number of pairs with any, and writes the fastest approach in m/s, and the largest
-    restitution, of the thread so far.
+    restitution, of the thread so far. `lags`: with velocities of half a substep ago.
     """
     find_impacts = make_find_impacts(features)
 
     @sequence
-    def find_batch_impacts(all_model, workspace, rows, crowd, pairs, b, h, extremes):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+    def find_batch_impacts(all_model, workspace, rows, crowd, pairs, b, h, extremes, lags):
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         lane = workspace.lane[0]
         gather_speeds(crowd, pairs, b, workspace)
         for i in range(LANES):
@@ -141,7 +146,7 @@ def make_find_batch_impacts(features):
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 pair = operands_of(model, mine, k)
-                find_impacts(mine, k, pair, model.half_pair[k], h, False)
+                find_impacts(mine, k, pair, model.half_pair[k], h, lags)
         found = 0
         for i in range(LANES):
             found += lane.colliding[i]
@@ -179,17 +184,15 @@ def make_push_out_batch(features):
             lane.colliding[i] = 1 if is_stirred(crowd, pairs, b, i, since) else 0
             some += lane.colliding[i]
         if some == 0:
-            return
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+            return 0
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 remove_push_out(operands_of(model, mine, k), lane.colliding)
         scatter_speeds(crowd, pairs, b, workspace)
+        return 0
 
     return push_out_batch
 
@@ -210,10 +213,7 @@ def make_impact_batch(features):
             some += lane.unconverged[i]
         if some == 0:
             return 0
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -245,11 +245,8 @@ def make_restitution_batch(features):
             lane.impact_work[i] = 0.0
             some += pairs.colliding[b, i]
         if some == 0:
-            return
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+            return 0
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -261,6 +258,7 @@ def make_restitution_batch(features):
             if pairs.colliding[b, i] != 0:
                 stir(crowd, pairs.first[b, i], stamp)
                 stir(crowd, pairs.second[b, i], stamp)
+        return 0
 
     return restitution_batch
 
@@ -272,10 +270,7 @@ def make_book_impacts(features):
 
     @sequence
     def book_impacts(all_model, workspace, rows, crowd, pairs, b, refresh):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         one, two = workspace.solid[0], workspace.solid[1]
         for c in range(3):
             for i in range(LANES):
@@ -301,16 +296,14 @@ def make_sweep_batch(features):
 
     @sequence
     def sweep_batch(all_model, workspace, rows, crowd, pairs, b, h, soft):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 sweep(operands_of(model, mine, k), model.half_pair[k], h, soft)
         scatter_speeds(crowd, pairs, b, workspace)
+        return 0
 
     return sweep_batch
 
@@ -322,16 +315,14 @@ def make_warm_batch(features):
 
     @sequence
     def warm_batch(all_model, workspace, rows, crowd, pairs, b):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 warm_start(operands_of(model, mine, k))
         scatter_speeds(crowd, pairs, b, workspace)
+        return 0
 
     return warm_batch
 
@@ -343,11 +334,8 @@ def make_finish_batch(features):
 
     @sequence
     def finish_batch(all_model, state, workspace, rows, crowd, pairs, b, h, elapsed, remembers):
-        kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        first_row, row_count = pairs.first_row[b], pairs.row_count[b]
-        mine = workspace_of(workspace, pairs, kind, b, rows, first_row, row_count)
-        own = state_of(state, pairs, kind, b)
+        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        own = state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b)
         one, two, lane = workspace.solid[0], workspace.solid[1], workspace.lane[0]
         mark_lanes(lane, pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], one)

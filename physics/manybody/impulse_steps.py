@@ -1,265 +1,41 @@
 """Substeps of one world of many bodies with the impulse law, by several threads.
 
-The steps of `impulse.solver`, but swept colour by colour: the pairs of one colour share no body, so
-they are solved at once, by any number of threads, with the same result. Those that found no colour
-are solved one after the other.
-
-Instantaneous collisions are local: only pairs with a body whose velocity a collision has changed
-take part, while in worlds side by side all contacts of a world do. The energy that restitution may
-return is that of the whole world's collisions in a substep, with the largest restitution among
-them.
+The steps of `impulse.solver`, but swept colour by colour. Those pairs that found no colour are
+solved one after the other.
 """
 
-import math
 from functools import cache
 
-from physics.compiler.atomics import wait_for_all
 from physics.compiler.code_cache import SOURCES
-from physics.compiler.jit import large_entry, sequence, stage
-from physics.impulse.restitution import MAX_SWEEPS
-from physics.integrators.kick import make_kick
+from physics.compiler.jit import large_entry, stage
 from physics.manybody.blocks import (
     add_contacts,
-    block_model,
-    block_workspace,
+    blocks_of,
     change_velocities,
-    known_forces,
-    make_move_block,
-    make_place_block,
+    make_end_step,
+    make_hold_joints,
+    make_known_forces,
+    make_move_group,
+    make_place_group,
     write_tensors,
 )
+from physics.manybody.colours import make_by_colour
+from physics.manybody.couplings import make_begin_joints, make_end_joints, make_keep_joints
+from physics.manybody.impact_steps import make_collide, make_find
 from physics.manybody.impulse_batches import (
-    make_book_impacts,
-    make_find_batch_impacts,
     make_finish_batch,
-    make_impact_batch,
     make_list_contacts,
     make_prepare_batch,
-    make_push_out_batch,
-    make_restitution_batch,
     make_sweep_batch,
     make_warm_batch,
-    stir,
 )
-from physics.manybody.spring_steps import BATCHES, REFRESH, RESUME, STEP
-from physics.manybody.tables import MOST_COLOURS
-from physics.model.features import EULER, Features, cached_by_features
+from physics.manybody.spring_steps import REFRESH, RESUME, STEP
+from physics.manybody.team import FAR, Team, share, takes_batch, total, wait
+from physics.model.features import EULER, Features
 from physics.model.state import STARTS_ANEW
 
 # what a call continues with, besides those of the spring law: there is room for all contact rows
 ROWS = 3
-# numbers that each thread writes for the others
-SHARED = 16
-
-
-@stage
-def of_thread(first, last, thread, threads):
-    """Where the part of a thread begins and ends."""
-    count = last - first
-    return first + count * thread // threads, first + count * (thread + 1) // threads
-
-
-@stage
-def part_of_colour(crowd, colour, thread, threads):
-    """Which entries of `Crowd.order` of a colour a thread works on, and whether there are any.
-
-    Pairs without a colour are left to the first thread.
-    """
-    begin, end = crowd.colour_first[colour], crowd.colour_first[colour + 1]
-    if colour < MOST_COLOURS:
-        first, last = of_thread(begin, end, thread, threads)
-    else:
-        first, last = begin, end if thread == 0 else begin
-    return first, last, end > begin
-
-
-@stage
-def total(shared, threads, column):
-    """Sum of what the threads have counted."""
-    found = 0.0
-    for t in range(threads):
-        found += shared[t, column]
-    return found
-
-
-@stage
-def largest(shared, threads, column):
-    """The largest of what the threads have found."""
-    found = 0.0
-    for t in range(threads):
-        found = max(found, shared[t, column])
-    return found
-
-
-@stage
-def all_work(crowd, pairs, barrier, thread, threads, shared):
-    """J of all impact impulses since it was last asked for; in the order of the batches."""
-    if thread == 0:
-        work = 0.0
-        for n in range(crowd.order.shape[0]):
-            b = crowd.order[n]
-            if pairs.busy[b] != 0:
-                for i in range(pairs.impact_work.shape[1]):
-                    work += pairs.impact_work[b, i]
-                    pairs.impact_work[b, i] = 0.0
-        shared[0, 4] = work
-    wait_for_all(barrier, 0, threads)
-    work = shared[0, 4]
-    wait_for_all(barrier, 0, threads)
-    return work
-
-
-@cached_by_features
-def make_collide(features):
-    """Sequence of the instantaneous collisions of a substep, see `impulse.restitution`."""
-    find_batch_impacts = make_find_batch_impacts(features)
-    push_out_batch, impact_batch = make_push_out_batch(features), make_impact_batch(features)
-    restitution_batch = make_restitution_batch(features)
-    book_impacts = make_book_impacts(features)
-
-    @sequence
-    def find(model, workspace, rows, crowd, pairs, h, barrier, thread, threads, shared, stamp):
-        """Number of colliding pairs; stirs their bodies at `stamp`."""
-        mine = shared[thread]
-        mine[0], mine[1], mine[2] = 0.0, 0.0, 0.0
-        for n in range(crowd.order.shape[0]):
-            b = crowd.order[n]
-            if n // BATCHES % threads == thread and pairs.busy[b] != 0:
-                mine[2] += find_batch_impacts(model, workspace, rows, crowd, pairs, b, h, mine)
-                for i in range(pairs.colliding.shape[1]):
-                    if pairs.colliding[b, i] != 0:
-                        stir(crowd, pairs.first[b, i], stamp)
-                        stir(crowd, pairs.second[b, i], stamp)
-        wait_for_all(barrier, 0, threads)
-        found = total(shared, threads, 2)
-        wait_for_all(barrier, 0, threads)
-        return found
-
-    @sequence
-    def push_out(model, workspace, rows, crowd, pairs, since, barrier, thread, threads):
-        for colour in range(MOST_COLOURS + 1):
-            first, last, used = part_of_colour(crowd, colour, thread, threads)
-            for n in range(first, last):
-                if pairs.busy[crowd.order[n]] != 0:
-                    push_out_batch(model, workspace, rows, crowd, pairs, crowd.order[n], since)
-            if used:
-                wait_for_all(barrier, 0, threads)
-
-    @sequence
-    def solve(
-        model, workspace, rows, crowd, pairs, fastest, after, barrier, thread, threads, shared,
-        stamp,
-    ):  # fmt: skip
-        """Sweeps until no velocity changes; only pairs with a body that the last sweep changed."""
-        for _ in range(MAX_SWEEPS):
-            moved = 0
-            for colour in range(MOST_COLOURS + 1):
-                first, last, used = part_of_colour(crowd, colour, thread, threads)
-                for n in range(first, last):
-                    b = crowd.order[n]
-                    if pairs.busy[b] != 0:
-                        moved += impact_batch(
-                            model, workspace, rows, crowd, pairs, b, stamp, stamp + 1, after,
-                            fastest,
-                        )  # fmt: skip
-                if used:
-                    wait_for_all(barrier, 0, threads)
-            stamp += 1
-            shared[thread, 3] = moved
-            wait_for_all(barrier, 0, threads)
-            moves = total(shared, threads, 3)
-            wait_for_all(barrier, 0, threads)
-            if moves == 0.0:
-                break
-        return stamp
-
-    @sequence
-    def restitute(
-        model, workspace, rows, crowd, pairs, rescale, scale, barrier, thread, threads, stamp
-    ):
-        for colour in range(MOST_COLOURS + 1):
-            first, last, used = part_of_colour(crowd, colour, thread, threads)
-            for n in range(first, last):
-                b = crowd.order[n]
-                if pairs.busy[b] != 0:
-                    restitution_batch(
-                        model, workspace, rows, crowd, pairs, b, rescale, scale, stamp
-                    )
-            if used:
-                wait_for_all(barrier, 0, threads)
-
-    @sequence
-    def collide(
-        model, workspace, rows, crowd, pairs, h, refresh, barrier, thread, threads, shared, stamp
-    ):
-        """Returns the last stamp, and whether anything has collided."""
-        # each stage is called in one place: two calls would be compiled twice
-        for attempt in range(2):
-            stamp += 1
-            found = find(
-                model, workspace, rows, crowd, pairs, h, barrier, thread, threads, shared, stamp
-            )
-            if found == 0.0:
-                return stamp, False
-            if attempt == 0:
-                push_out(model, workspace, rows, crowd, pairs, stamp, barrier, thread, threads)
-        fastest, e = largest(shared, threads, 0), largest(shared, threads, 1)
-        wait_for_all(barrier, 0, threads)
-        for after in range(2):
-            stamp = solve(
-                model, workspace, rows, crowd, pairs, fastest, after == 1, barrier, thread,
-                threads, shared, stamp,
-            )  # fmt: skip
-            if after == 1:
-                break
-            work = all_work(crowd, pairs, barrier, thread, threads, shared)
-            allowed, scale = e * e * max(-work, 0.0), 1.0
-            stamp += 1
-            for rescale in range(2):
-                restitute(
-                    model, workspace, rows, crowd, pairs, rescale == 1, scale, barrier, thread,
-                    threads, stamp,
-                )  # fmt: skip
-                gained = all_work(crowd, pairs, barrier, thread, threads, shared)
-                scale = math.sqrt(allowed / gained) if gained > allowed else 1.0
-        for n in range(crowd.order.shape[0]):
-            b = crowd.order[n]
-            if n // BATCHES % threads == thread and pairs.busy[b] != 0:
-                book_impacts(model, workspace, rows, crowd, pairs, b, refresh)
-        wait_for_all(barrier, 0, threads)
-        return stamp, True
-
-    return collide
-
-
-@cached_by_features
-def make_sweeps(features):
-    """Sequences of a sweep over all contacts, and of the first guess."""
-    sweep_batch, warm_batch = make_sweep_batch(features), make_warm_batch(features)
-
-    @sequence
-    def sweep_all(model, workspace, rows, crowd, pairs, h, soft, barrier, thread, threads):
-        for colour in range(MOST_COLOURS + 1):
-            first, last, used = part_of_colour(crowd, colour, thread, threads)
-            for n in range(first, last):
-                b = crowd.order[n]
-                if pairs.busy[b] != 0:
-                    sweep_batch(model, workspace, rows, crowd, pairs, b, h, soft)
-            if used:
-                wait_for_all(barrier, 0, threads)
-
-    @sequence
-    def warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads):
-        for colour in range(MOST_COLOURS + 1):
-            first, last, used = part_of_colour(crowd, colour, thread, threads)
-            for n in range(first, last):
-                b = crowd.order[n]
-                if pairs.busy[b] != 0:
-                    warm_batch(model, workspace, rows, crowd, pairs, b)
-            if used:
-                wait_for_all(barrier, 0, threads)
-
-    return sweep_all, warm_all
 
 
 @stage
@@ -277,112 +53,121 @@ def place_rows(crowd, pairs):
 def make_impulse_steps(features: Features):
     """Entry point: as `make_spring_steps`, with contact rows that all threads share."""
     sources = SOURCES
-    move_block, place_block = make_move_block(features), make_place_block(features)
+    move_group, place_group = make_move_group(features), make_place_group(features)
+    known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     list_contacts, prepare_batch = make_list_contacts(features), make_prepare_batch(features)
-    collide, kick = make_collide(features), make_kick(features)
-    sweep_all, warm_all = make_sweeps(features)
-    finish_batch = make_finish_batch(features)
-    euler = features.integrator == EULER
-    before, lag = (1.0, 0.0) if euler else (0.5, 0.5)
+    find, collide = make_find(features), make_collide(features)
+    sweep = make_by_colour(features, make_sweep_batch(features))
+    warm_start = make_by_colour(features, make_warm_batch(features))
+    begin_joints, keep_joints = make_begin_joints(features), make_keep_joints(features)
+    end_joints, joints = make_end_joints(features), features.joints
+    finish_batch, end_step = make_finish_batch(features), make_end_step(features)
+    before, lag = (1.0, 0.0) if features.integrator == EULER else (0.5, 0.5)
 
     @large_entry
     def impulse_steps(
         model, state, workspace, rows, crowd, pairs, h, substeps, collision_substeps, progress,
         barrier, shared, thread, threads,
     ):  # fmt: skip
-        """`rows`: of CONTACT_ROW; `shared`: [threads, SHARED]; all else as `spring_steps`.
+        """`rows`: of CONTACT_ROW; all else as `spring_steps`.
 
         progress[2] is 2 where there are not enough rows, and progress[3] says how many it takes.
         """
         _ = sources
-        blocks, batches = crowd.solid.shape[0], crowd.order.shape[0]
-        first, last = of_thread(0, blocks, thread, threads)
+        team, batches = Team(barrier, shared, thread, threads), crowd.order.shape[0]
+        first, last = share(0, crowd.group.shape[0], team)
         done, phase, stamp = progress[0], progress[1], progress[4]
-        wait_for_all(barrier, 0, threads)  # before any thread writes the progress
+        wait(team)  # before any thread writes the progress
         while done < substeps or phase != STEP:
             refresh = phase == REFRESH or (phase == ROWS and progress[5] != 0)
             if phase == STEP:
                 far = 0
-                for m in range(first, last):
-                    far += move_block(model, workspace, crowd, m, before * h, h)
-                shared[thread, 5] = far
-                wait_for_all(barrier, 0, threads)
-                far = total(shared, threads, 5)
-                wait_for_all(barrier, 0, threads)
-                if far > 0:
+                for g in range(first, last):
+                    far += move_group(model, workspace, crowd, g, before * h, h)
+                shared[thread, FAR] = far
+                if total(team, FAR) > 0:
                     if thread == 0:
                         progress[0], progress[1], progress[2] = done, RESUME, 1
                         progress[4] = stamp
                     return
             elif phase == REFRESH:
-                for m in range(first, last):
-                    place_block(model, workspace, crowd, m)
-                wait_for_all(barrier, 0, threads)
+                for g in range(first, last):
+                    place_group(model, workspace, crowd, g)
+                wait(team)
             span, drifted = (before * h, 0.0) if refresh else (h, h)
             elapsed = done * h + drifted
             remembers = not refresh or progress[6] == STARTS_ANEW
             starts = not refresh and done > 0 and done % collision_substeps == 0
             if phase != ROWS:
                 for n in range(batches):
-                    if n // BATCHES % threads == thread:
+                    if takes_batch(n, team):
                         list_contacts(model, state, workspace, crowd, pairs, crowd.order[n], starts)
-            for m in range(first, last):
-                write_tensors(crowd, m)
-                known_forces(model, workspace, crowd, m)
-            wait_for_all(barrier, 0, threads)
+                for g in range(first, last):
+                    known_forces(model, workspace, crowd, g, drifted)
+                    hold_joints(model, state, workspace, crowd, g, h, drifted)
+                    for m in blocks_of(crowd, g):
+                        write_tensors(crowd, m)
+            wait(team)
             if thread == 0:
                 progress[3] = place_rows(crowd, pairs)
-            wait_for_all(barrier, 0, threads)
+            wait(team)
             if progress[3] > rows.shape[0]:
-                wait_for_all(barrier, 0, threads)
+                wait(team)
                 if thread == 0:
                     progress[0], progress[1], progress[2] = done, ROWS, 2
                     progress[4], progress[5] = stamp, 1 if refresh else 0
                 return
             for n in range(batches):
                 b = crowd.order[n]
-                if n // BATCHES % threads == thread and pairs.busy[b] != 0:
+                if takes_batch(n, team) and pairs.busy[b] != 0:
                     prepare_batch(model, state, workspace, rows, crowd, pairs, b, span, remembers)
-            wait_for_all(barrier, 0, threads)
+            wait(team)
+            if joints:  # see `restitution.make_find_impacts`
+                find(model, workspace, rows, crowd, pairs, span, team, stamp, True)
             # velocities are half a step old; bodies collide with the present ones
-            for m in range(first, last):
-                change_velocities(crowd, m, lag * drifted)
-            wait_for_all(barrier, 0, threads)
+            for g in range(first, last):
+                for m in blocks_of(crowd, g):
+                    change_velocities(crowd, m, lag * drifted)
+            wait(team)
             stamp, collided = collide(
-                model, workspace, rows, crowd, pairs, span, drifted == 0.0, barrier, thread,
-                threads, shared, stamp,
-            )  # fmt: skip
-            for m in range(first, last):
-                if collided and not refresh:
-                    solid = crowd.solid[m]
-                    add_contacts(crowd, pairs, m, solid.momentum, solid.angular_momentum)
-                change_velocities(crowd, m, -lag * drifted)
-            wait_for_all(barrier, 0, threads)
+                model, workspace, rows, crowd, pairs, span, drifted == 0.0, team, stamp
+            )
+            if collided:
+                end_joints(model, workspace, crowd, span if refresh else 0.0, team)
+            for g in range(first, last):
+                for m in blocks_of(crowd, g):
+                    if collided and not refresh:
+                        solid = crowd.solid[m]
+                        add_contacts(crowd, pairs, m, solid.momentum, solid.angular_momentum)
+                    change_velocities(crowd, m, -lag * drifted)
+            wait(team)
             for soft in range(2):
                 if soft == 1:
-                    for m in range(first, last):
-                        change_velocities(crowd, m, span)
-                    wait_for_all(barrier, 0, threads)
-                    warm_all(model, workspace, rows, crowd, pairs, barrier, thread, threads)
-                sweep_all(
-                    model, workspace, rows, crowd, pairs, span, soft == 1, barrier, thread, threads
-                )
+                    for g in range(first, last):
+                        for m in blocks_of(crowd, g):
+                            change_velocities(crowd, m, span)
+                    wait(team)
+                motor_time = span if soft == 1 else 0.0
+                begin_joints(model, workspace, crowd, soft == 0, soft == 1, motor_time, team)
+                if soft == 1:
+                    warm_start(model, workspace, rows, crowd, pairs, team, ())
+                sweep(model, workspace, rows, crowd, pairs, team, (span, soft == 1))
+                keep_joints(model, workspace, crowd, pairs, -1, motor_time, team)
+            end_joints(model, workspace, crowd, span, team)
             for n in range(batches):
                 b = crowd.order[n]
-                if n // BATCHES % threads == thread and pairs.busy[b] != 0:
+                if takes_batch(n, team) and pairs.busy[b] != 0:
                     finish_batch(
                         model, state, workspace, rows, crowd, pairs, b, span, elapsed, remembers
                     )
-            wait_for_all(barrier, 0, threads)
-            for m in range(first, last):
-                solid = crowd.solid[m]
-                add_contacts(crowd, pairs, m, solid.force, solid.torque)
-                if not refresh and not euler:
-                    own = block_model(model, crowd, m)
-                    kick(own, block_workspace(workspace, crowd, m), 0.5 * h)
+            wait(team)
+            for g in range(first, last):
+                for m in blocks_of(crowd, g):
+                    add_contacts(crowd, pairs, m, crowd.solid[m].force, crowd.solid[m].torque)
+                end_step(model, workspace, crowd, g, drifted, (1.0 - before) * drifted)
             done += 0 if refresh else 1
             phase = STEP
-        wait_for_all(barrier, 0, threads)
+        wait(team)
         if thread == 0:
             progress[0], progress[1], progress[2], progress[4] = done, STEP, 0, stamp
 

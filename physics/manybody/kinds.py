@@ -11,22 +11,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.manybody.tables import PAIR_KIND
-from physics.model.build import build
+from physics.model.build import build, couplings
 from physics.model.features import GENERAL, Features
 from physics.model.tables import Model
+from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground, Static, touch_each_other
+from physics.scene.validation import ZERO
 
 Array = np.ndarray
-Solid = Body | Static | Ground
+Solid = Body | Drive | Static | Ground
 
 
 class Kinds(NamedTuple):
     """The kinds of a scene's solids and pairs.
 
     Attributes:
-        of_solid: [solids] kind of each: of the bodies, then of the statics.
+        of_solid: [solids] kind of each: of the bodies, the drives, then of the statics.
         pair: [kinds, kinds] row of `pair_kind`; -1 where solids can't touch. Symmetric.
         pair_kind: of PAIR_KIND.
         model: tables of all kinds of pairs, one after the other; solids of a pair are rows 0 and 1.
@@ -41,8 +43,8 @@ class Kinds(NamedTuple):
 
 
 def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
-    """The kinds of a scene of bodies and statics."""
-    solids: list[Solid] = [*scene.bodies, *scene.statics]
+    """The kinds of a scene's solids."""
+    solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
     known: dict[Any, int] = {}
     of_solid = np.array([known.setdefault(_identity(solid), len(known)) for solid in solids])
     examples = [solids[int(np.argmax(of_solid == kind))] for kind in range(len(known))]
@@ -52,7 +54,7 @@ def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
     built: list[tuple[Model, Features]] = []
     sizes = np.zeros(3, dtype=int)  # half-pairs, samples, parts so far
     for i, a in enumerate(examples):
-        if not isinstance(a, Body):
+        if isinstance(a, Static | Ground):
             break
         for j in range(i, len(examples)):
             b = examples[j]
@@ -71,13 +73,14 @@ def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
         body = scene.bodies[0]
         model, features = build(_scene_of_two(scene, body, body), fidelity)
         empty = np.zeros(0, PAIR_KIND)
-        return Kinds(of_solid, pair, empty, model._replace(half_pair=model.half_pair[:0]), features)
+        model = model._replace(half_pair=model.half_pair[:0])
+        return Kinds(of_solid, pair, empty, model, _united([features], scene))
     return Kinds(
         of_solid,
         pair,
         np.array(rows, dtype=PAIR_KIND),
         _joined([model for model, _ in built]),
-        _united([features for _, features in built]),
+        _united([features for _, features in built], scene),
     )
 
 
@@ -86,17 +89,23 @@ def _identity(solid: Solid) -> Any:
     if isinstance(solid, Ground):
         return "ground", solid.height, solid.material, solid.group, solid.mask
     shared = (solid.shape, solid.material, solid.group, solid.mask)
-    return ("body", solid.mass, *shared) if isinstance(solid, Body) else ("static", *shared)
+    if isinstance(solid, Static):
+        return "static", *shared
+    return "body" if isinstance(solid, Body) else "drive", solid.mass, *shared
 
 
-def _scene_of_two(scene: Scene, a: Body, b: Solid) -> Scene:
+def _scene_of_two(scene: Scene, a: Solid, b: Solid) -> Scene:
     """One solid of each kind, at rest."""
-    still = {"linear_velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0), "name": None}
-    one = replace(a, density=None, **still)  # type: ignore[arg-type]
-    if isinstance(b, Body):
-        two = replace(b, density=None, **still)  # type: ignore[arg-type]
-        return Scene(bodies=[one, two], gravity=scene.gravity)
-    return Scene(bodies=[one], statics=[replace(b, name=None)], gravity=scene.gravity)
+    bodies, drives, statics = [], [], []
+    for solid in (a, b):
+        if isinstance(solid, Body):
+            still = {"linear_velocity": ZERO, "angular_velocity": ZERO, "name": None}
+            bodies.append(replace(solid, density=None, **still))  # type: ignore[arg-type]
+        elif isinstance(solid, Drive):
+            drives.append(replace(solid, name=None))
+        else:
+            statics.append(replace(solid, name=None))
+    return Scene(bodies=bodies, drives=drives, statics=statics, gravity=scene.gravity)
 
 
 def _joined(models: list[Model]) -> Model:
@@ -136,10 +145,10 @@ def _joined(models: list[Model]) -> Model:
     )
 
 
-def _united(all_features: list[Features]) -> Features:
-    """What any of several scenes needs."""
+def _united(all_features: list[Features], scene: Scene) -> Features:
+    """What any of several scenes of two solids needs, and what couples the bodies of a scene."""
     values: dict[str, Any] = {}
     for name in Features._fields:
         each = [getattr(features, name) for features in all_features]
         values[name] = max(each)
-    return Features(**{**values, "rotation": GENERAL})
+    return Features(**values)._replace(rotation=GENERAL, **couplings(scene))

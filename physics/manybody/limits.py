@@ -7,6 +7,7 @@ import numpy as np
 
 from physics.analysis.step_limits import check_step
 from physics.model.build import build
+from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, touch_each_other
@@ -19,40 +20,55 @@ _NEIGHBOURS = 6
 _MOST = 8
 
 
-def check_crowd(scene: Scene, fidelity: Fidelity, of_solid: Array) -> None:
+def check_crowd(
+    scene: Scene, fidelity: Fidelity, of_solid: Array, mechanisms: tuple[Scene, ...] = ()
+) -> None:
     """Raises an error if the substep is too long for a scene of many bodies.
 
     What limits a step are the kinds of bodies that touch each other, not their number. So each kind
     is checked on the statics, and, if a material gives a stiffness, between six of each kind that
     it can touch. Of many kinds those with the lightest bodies are checked, and those with the
-    heaviest beside them.
+    heaviest beside them. Servos and fields are checked in the mechanisms.
 
     Args:
-        scene: of bodies and statics.
+        scene: what is in each world.
         fidelity: of the physics.
-        of_solid: [bodies and statics] kind of each.
+        of_solid: [solids] kind of each: bodies, drives, statics.
+        mechanisms: one of each structure.
 
     Raises:
         ValueError: see `analysis.step_limits.check_step`.
     """
-    of_body = of_solid[: len(scene.bodies)]
-    found, first = np.unique(of_body, return_index=True)
-    by_mass = sorted(first.tolist(), key=lambda n: cast(float, scene.bodies[n].mass))
+    dynamic: list[Body | Drive] = [*scene.bodies, *scene.driven_bodies]
+    found, first = np.unique(of_solid[: len(dynamic)], return_index=True)
+    by_mass = sorted(first.tolist(), key=lambda n: cast(float, dynamic[n].mass))
     if len(found) > 2 * _MOST:
         by_mass = [*by_mass[:_MOST], *by_mass[-_MOST:]]
-    known = {int(kind): n for n, kind in enumerate(of_solid[len(scene.bodies) :])}
+    known = {int(kind): n for n, kind in enumerate(of_solid[len(dynamic) :])}
     statics = [scene.statics[n] for n in sorted(known.values())]
-    solids = (*scene.bodies, *scene.statics)
+    solids = (*dynamic, *scene.statics)
     stiff = any(solid.material.stiffness is not None for solid in solids)
     for n in by_mass:
-        own = replace(scene.bodies[n], name=scene.solid_names[n], density=None)
+        own = _named(dynamic[n], scene.solid_names[n])
         _check([own], statics, scene, fidelity)
         for m in by_mass if stiff else ():
-            if touch_each_other(own, scene.bodies[m]):
-                around = replace(scene.bodies[m], name=None, density=None)
+            if touch_each_other(own, dynamic[m]):
+                around = _named(dynamic[m], None)
                 _check([own, *([around] * _NEIGHBOURS)], statics, scene, fidelity)
+    for mechanism in mechanisms if scene.fields or scene.drives else ():
+        check_step(mechanism, fidelity, *build(mechanism, fidelity))
 
 
-def _check(bodies: list[Body], statics: list[Any], scene: Scene, fidelity: Fidelity) -> None:
-    few = Scene(bodies=bodies, statics=statics, gravity=scene.gravity)
+def _named(solid: Body | Drive, name: str | None) -> Body | Drive:
+    if isinstance(solid, Body):
+        return replace(solid, name=name, density=None)
+    return replace(solid, name=name)
+
+
+def _check(
+    dynamic: list[Body | Drive], statics: list[Any], scene: Scene, fidelity: Fidelity
+) -> None:
+    bodies = [solid for solid in dynamic if isinstance(solid, Body)]
+    drives = [solid for solid in dynamic if isinstance(solid, Drive)]
+    few = Scene(bodies=bodies, drives=drives, statics=statics, gravity=scene.gravity)
     check_step(few, fidelity, *build(few, fidelity, own_spacing=True))

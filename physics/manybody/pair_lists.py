@@ -8,6 +8,7 @@ from physics.compiler.jit import LANES
 from physics.manybody.extents import half_extents
 from physics.manybody.homes import Homes, make_incidence, make_merge, make_settle, no_homes
 from physics.manybody.kinds import Kinds
+from physics.manybody.mechanisms import Mechanisms
 from physics.manybody.near_pairs import Grid, grid_levels, make_near_pairs
 from physics.manybody.repack import make_occupancy, make_repack, room_for
 from physics.manybody.sorting import lexicographic_order, make_sort_pairs
@@ -22,7 +23,6 @@ from physics.manybody.tables import (
     no_pairs,
     with_room,
 )
-from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Ground
 
@@ -45,14 +45,13 @@ class PairLists:
         homes: [n] of each.
     """
 
-    def __init__(self, scene: Scene, fidelity: Fidelity, kinds: Kinds, blocks: int) -> None:
+    def __init__(self, scene: Scene, kinds: Kinds, mechanisms: Mechanisms, blocks: int) -> None:
         """Without any pair yet; the arrays of what never changes."""
         self._kinds, self._bodies = kinds, blocks * LANES
         self._places = self._bodies + len(scene.statics)
-        at = np.concatenate([
-            np.arange(len(scene.bodies)), self._bodies + np.arange(len(scene.statics))
-        ]).astype(int)  # fmt: skip
-        solids: list[Any] = [*scene.bodies, *scene.statics]
+        at = np.concatenate([mechanisms.place, self._bodies + np.arange(len(scene.statics))])
+        solids: list[Any] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
+        self._excluded = self._never_touching(scene, at)
         examples = [int(np.argmax(kinds.of_solid == kind)) for kind in range(len(kinds.pair))]
         shapes = [None if isinstance(solids[n], Ground) else solids[n].shape for n in examples]
         self._kind = np.full(self._places, -1)
@@ -68,10 +67,23 @@ class PairLists:
         self._reach = of_place([0.0 if s is None else s.reach for s in shapes], 0.0)
         margin = of_place([0.0 if s is None else NEAR_MARGIN * s.width for s in shapes], 0.0)
         margin[self._bodies :] = 0.0
-        self._least_margin = margin
+        # copies of bodies, and drives that nothing can touch, may go anywhere
+        self._least_margin = np.where(self._kind < 0, np.inf, margin)
         self._grid, self._counts = Grid.of(self._places), np.zeros(self._places + 1, np.int64)
         self._room = np.zeros(8 * self._places, np.int64)
         self.clear()
+
+    def _never_touching(self, scene: Scene, at: Array) -> Array:
+        """Pairs, as in `found`, of the fingers of a gripper and of solids that a joint connects."""
+        first = len(scene.bodies)
+        pairs = [(first + n, first + n + 1) for n, _ in scene.grippers]
+        pairs += scene.jointed_pairs
+        found = np.zeros((2, len(pairs)), np.int64)
+        for n, (a, b) in enumerate(pairs):
+            kinds = self._kinds.of_solid[a], self._kinds.of_solid[b]
+            swap = kinds[1] < kinds[0] or (kinds[0] == kinds[1] and at[b] < at[a])
+            found[:, n] = (at[b], at[a]) if swap else (at[a], at[b])
+        return found[0] * self._places + found[1]
 
     def clear(self) -> None:
         """Forgets all pairs."""
@@ -140,6 +152,8 @@ class PairLists:
             if count <= len(self._room):
                 found = np.empty(count, np.int64)
                 make_sort_pairs()(self._room[:count], self._places, self._counts, found)
+                if len(self._excluded):
+                    found = found[~np.isin(found, self._excluded)]
                 return found
             self._room = np.zeros(count + count // 4, np.int64)
 

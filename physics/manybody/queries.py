@@ -24,10 +24,11 @@ class CrowdQueries:
         self._simulation = simulation
 
     def _solid(self, places: Array) -> Array:
-        """Indices of solids: bodies, then statics."""
-        simulation = self._simulation
-        beyond = simulation.places_of_bodies - simulation.bodies
-        return np.where(places < simulation.bodies, places, places - beyond)
+        """Indices of solids: bodies, drives, then statics."""
+        body = self._simulation.mechanisms.body
+        beyond = len(body) - len(self._simulation.mechanisms.place)
+        return np.where(places < len(body), body[np.minimum(places, len(body) - 1)],
+                        places - beyond)  # fmt: skip
 
     def _touching(self, world: int) -> Array:
         """Rows of TOUCH of a world."""
@@ -114,10 +115,10 @@ class CrowdQueries:
     def _of_pair(self, first: int, second: int) -> list[tuple[Any, int]]:
         """Of each world the half-pairs of a pair, none if the two aren't near, and the lane."""
         simulation = self._simulation
-        kinds = simulation.kinds
-        one, other = sorted((first, second), key=lambda s: (kinds.of_solid[s], s))
-        beyond = simulation.places_of_bodies - simulation.bodies
-        places = [s if s < simulation.bodies else s + beyond for s in (one, other)]
+        kinds, place = simulation.kinds, simulation.mechanisms.place
+        beyond = len(simulation.mechanisms.body) - len(place)
+        at = {s: int(place[s]) if s < len(place) else s + beyond for s in (first, second)}
+        places = [at[s] for s in sorted(at, key=lambda s: (kinds.of_solid[s], at[s]))]
         found: list[tuple[Any, int]] = []
         for world in range(simulation.count):
             home = simulation.home(world, *places)

@@ -60,6 +60,7 @@ def make_repack(features: Features):
     clear = make_clear(features)
     memory_size = contact_memory(features).size
     impulse, particles = features.impulse, features.particles
+    hidden = features.box and features.compound
 
     @stage
     def put_aside(row, candidate, sample_id, i, aside, at):
@@ -108,6 +109,8 @@ def make_repack(features: Features):
             slot.weight[i] = aside[at + 1]
             for c in range(3):
                 slot.sample[c, i] = aside[at + 2 + c]
+                if hidden:  # another kind of pair may have had the slot
+                    slot.hidden_offset[c, i] = 0.0
                 if impulse:
                     slot.impact_force[c, i] = aside[at + 5 + c]
                 if particles:

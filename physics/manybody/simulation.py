@@ -5,19 +5,23 @@ from typing import Any
 import numpy as np
 
 from physics.compiler.jit import LANES, aligned_zeros
-from physics.manybody.impulse_steps import SHARED, make_impulse_steps
+from physics.manybody.impulse_steps import make_impulse_steps
 from physics.manybody.kinds import Kinds, find_kinds
+from physics.manybody.mechanisms import Mechanisms, find_mechanisms
 from physics.manybody.pair_lists import PairLists
-from physics.manybody.spring_steps import FIRST_COUNT, REFRESH, STEP, make_spring_steps
+from physics.manybody.spring_steps import REFRESH, STEP, make_spring_steps
 from physics.manybody.tables import FRAME_WIDTH, MOST_COLOURS, POSITION, ROTATION, Crowd, Pairs
+from physics.manybody.team import SHARED
 from physics.manybody.transfer import make_load_bodies, make_place_bodies, make_store_bodies
 from physics.model.build import dynamic_rows, per_world_dtype
 from physics.model.coefficients import dynamic_columns
 from physics.model.features import Features
+from physics.model.fields import field_rows
+from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.state import STARTS_ANEW
 from physics.model.tables import DYNAMIC_PER_WORLD, Model
-from physics.model.workspace import CONTACT_ROW, SOLID, Workspace
+from physics.model.workspace import CONTACT_ROW, JOINT_WORK, SOLID, START, Workspace
 from physics.rotation import rotation_matrix
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
@@ -37,10 +41,9 @@ _FEWEST_BATCHES = 32
 
 
 def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
-    """Whether a scene is simulated here: many bodies, on which contacts and gravity alone act."""
-    only_contacts = not (scene.drives or scene.joints or scene.fields or per_world_parameters)
+    """Whether a scene is simulated here: many bodies, the same in all worlds."""
     fixed = fidelity.time_control == "fixed" and fidelity.integrator in ("midpoint", "euler")
-    return len(scene.bodies) >= MANY and only_contacts and fixed
+    return len(scene.bodies) >= MANY and fixed and not per_world_parameters
 
 
 class CrowdSimulation(Simulation):
@@ -48,19 +51,26 @@ class CrowdSimulation(Simulation):
 
     Attributes:
         kinds: of solids and pairs.
+        mechanisms: what couples bodies otherwise than by contact.
     """
 
     kinds: Kinds
+    mechanisms: Mechanisms
 
     def _build(self) -> tuple[Model, Features]:
         """Tables of the bodies; those of pairs are in `kinds`."""
         scene = self.scene
-        self.kinds = find_kinds(scene, self.fidelity)
+        kinds, self.mechanisms = find_kinds(scene, self.fidelity), find_mechanisms(scene)
+        model = kinds.model._replace(
+            joint_row=self.mechanisms.joint_row,
+            field=self.mechanisms.field,
+            surface_point=self.mechanisms.surface_point,
+        )
+        self.kinds = kinds._replace(model=model)
         layout = Layout.of(scene, self.fidelity, no_half_pairs=True)
         dynamic = dynamic_rows(scene)
         for name, values in dynamic_columns(layout, Parameters.of(scene)).items():
             dynamic[name] = values[0]
-        model = self.kinds.model
         poses = [
             (0.0, 0.0, s.height, *IDENTITY) if isinstance(s, Ground) else
             (*s.position, *s.orientation)
@@ -71,11 +81,13 @@ class CrowdSimulation(Simulation):
             half_pair=model.half_pair[:0],
             compound_part=model.compound_part[:0],
             static=np.array(poses, dtype=float).reshape(-1, 7),
+            field=field_rows(scene)[0],
+            joint_row=joint_rows(scene, len(dynamic) + len(poses)),
         )
         return base, self.kinds.features
 
     def _find_kernels(self) -> None:
-        impulse = self.fidelity.law == "impulse"
+        impulse = self.kinds.features.impulse
         make: Any = make_impulse_steps if impulse else make_spring_steps
         self._advance, self._compiled = make(self.kinds.features), False
         self._load, self._store = make_load_bodies(), make_store_bodies()
@@ -87,19 +99,22 @@ class CrowdSimulation(Simulation):
         self._worlds = [[self._empty_world()] for _ in range(self.count)]
         blocks = len(self._worlds[0][0].solid)
         self._lists = [
-            PairLists(self.scene, self.fidelity, self.kinds, blocks) for _ in range(self.count)
+            PairLists(self.scene, self.kinds, self.mechanisms, blocks) for _ in range(self.count)
         ]
 
     def _empty_world(self) -> Crowd:
         """The arrays of a world whose bodies rest at the origin."""
-        bodies, static = self.base.dynamic[: self.bodies], self.base.static
-        blocks = -(-self.bodies // LANES)
+        found, static = self.mechanisms, self.base.static
+        blocks, groups = len(found.body) // LANES, len(found.group)
         places = blocks * LANES + len(static)
-        constants = aligned_zeros(blocks, per_world_dtype(bodies.dtype, DYNAMIC_PER_WORLD))
-        padded = np.concatenate([bodies, np.repeat(bodies[:1], blocks * LANES - self.bodies)])
-        padded["weight"][self.bodies :] = 0.0
-        for name in bodies.dtype.names or ():
-            values = padded[name].reshape(blocks, LANES, *padded[name].shape[1:])
+        dtype = per_world_dtype(self.base.dynamic.dtype, DYNAMIC_PER_WORLD)
+        constants, rows = aligned_zeros(blocks, dtype), self.base.dynamic[found.body]
+        copies = np.ones(len(rows), dtype=bool)
+        copies[found.place] = False
+        rows["weight"][copies] = 0.0
+        rows["gripper_partner"] = self._local_partners(rows)
+        for name in dtype.names or ():
+            values = rows[name].reshape(blocks, LANES, *rows[name].shape[1:])
             if name in DYNAMIC_PER_WORLD:
                 constants[name] = np.moveaxis(values, 1, -1)
             else:
@@ -115,6 +130,13 @@ class CrowdSimulation(Simulation):
         return Crowd(
             constants=constants,
             solid=solid,
+            group=found.group,
+            present=found.present,
+            body=found.body,
+            place=found.place,
+            joint=aligned_zeros(len(found.joint_row), JOINT_WORK),
+            joint_factor=aligned_zeros((found.entries, LANES), np.dtype(float)),
+            motor=np.zeros((groups * LANES, found.motor[:, 1].max(initial=-1) + 1, 2)),
             frame=frame,
             tensor=np.zeros((places, 8)),
             margin=np.zeros((blocks, LANES)),
@@ -126,7 +148,16 @@ class CrowdSimulation(Simulation):
             colour_first=np.zeros(MOST_COLOURS + 2, np.int64),
             pair_kind=self.kinds.pair_kind,
             stirred=np.zeros(blocks * LANES, np.int64),
+            joint_work=np.zeros(groups),
         )  # fmt: skip
+
+    def _local_partners(self, rows: Array) -> Array:
+        """Of each place the finger that is its partner, counted within the mechanism; -1: none."""
+        local, first = np.full(len(rows), -1), self.mechanisms.group["first_block"]
+        for p in np.flatnonzero(rows["gripper_partner"] >= 0):
+            block = self.mechanisms.place[rows["gripper_partner"][p]] // LANES
+            local[p] = block - first[np.searchsorted(first, block, side="right") - 1]
+        return local
 
     def _run(self, h: float, substeps: int, worlds: Array) -> bool:
         """Advances the worlds of a mask; returns whether all went well."""
@@ -155,12 +186,14 @@ class CrowdSimulation(Simulation):
         status, lists, crowd = self.state.world[w : w + 1], self._lists[w], self._worlds[w][0]
         if self.features.wrench:
             wrench = np.zeros((crowd.motion.size, 6))
-            wrench[: self.bodies] = self.state.wrench[w]
+            wrench[crowd.place] = self.state.wrench[w]
             crowd = crowd._replace(wrench=wrench)
         self._load(self.state.dynamic, w, crowd)
+        row, column = self.mechanisms.motor.T
+        crowd.motor[row, column] = self.state.motor[w]
         mark = int(status["needs_refresh"][0])
         status["overflow"] = 0
-        progress = np.zeros(FIRST_COUNT + self.threads, np.int64)
+        progress = np.zeros(7, np.int64)
         progress[1], progress[6] = REFRESH if mark else STEP, mark
         crowd.stirred[...] = 0
         if mark == STARTS_ANEW:
@@ -179,9 +212,9 @@ class CrowdSimulation(Simulation):
             finite = bool(np.isfinite(crowd.frame).all())
             if finite:
                 crowd = lists.search(crowd)
-        diverged = self._store(self.state.dynamic, w, crowd, self.bodies)
+        diverged = self._store(self.state.dynamic, w, crowd)
         if not finite and diverged == 0:
-            diverged = 1 + int(np.argmin(np.isfinite(crowd.frame).all(axis=1)))
+            diverged = 1 + int(np.argmin(np.isfinite(crowd.frame[crowd.place]).all(axis=1)))
         status["time"] += int(progress[0]) * h
         status["needs_refresh"] = 0
         status["diverged"] = diverged
@@ -210,14 +243,14 @@ class CrowdSimulation(Simulation):
         state = self.state._replace(world=self.state.world[w : w + 1])
         barrier = np.zeros(SHARED, np.int64)
 
-        impulse = self.fidelity.law == "impulse"
+        impulse = self.kinds.features.impulse
         shared = np.zeros((threads, SHARED))
 
         def run(thread: int, threads: int, substeps: int, progress: Array) -> Any:
             return self._advance(
                 self.kinds.model, state, self._idle[thread], *([self._rows] if impulse else []),
                 crowd, lists.pairs, h, substeps, self.fidelity.collision_substeps, progress,
-                barrier, *([shared] if impulse else []), thread, threads,
+                barrier, shared, thread, threads,
             )  # fmt: skip
 
         if not self._compiled:  # by one thread, without a step: the others can't wait for it
@@ -244,7 +277,7 @@ class CrowdSimulation(Simulation):
         """Adds the state of forces from the user, unless it is there; kernels need nothing new."""
         if not self.features.wrench:
             self.features = self.features._replace(wrench=True)
-            rows = np.zeros((self.count, self.bodies, 6))
+            rows = np.zeros((self.count, len(self.base.dynamic), 6))
             self.state = self.state._replace(wrench=rows)
 
     def restore(self, saved: Any) -> None:
@@ -264,14 +297,12 @@ class CrowdSimulation(Simulation):
         """Home of the pair of two places, -1 if they aren't near each other."""
         return self._lists[world].home(first, second)
 
-    @property
-    def places_of_bodies(self) -> int:
-        """Number of places before those of statics."""
-        return int(self._worlds[0][0].motion.size)
-
     def working_memory(self) -> Workspace:
         """Of one thread, for any kind of pair."""
         kinds = self.kinds
         whole = Workspace.of(kinds.model, self.features)
         parts = int(kinds.pair_kind["part_count"].max(initial=0))
-        return whole._replace(solid=aligned_zeros(2 + parts, SOLID))
+        return whole._replace(
+            solid=aligned_zeros(2 + parts, SOLID),
+            start=aligned_zeros(self.mechanisms.most_blocks, START),
+        )

@@ -30,6 +30,24 @@ PAIR_KIND = np.dtype(
     align=True,
 )
 
+# one row per body group: mechanisms of the same structure side by side, one per lane, or bodies
+# that nothing couples
+BODY_GROUP = np.dtype(
+    [
+        ("first_block", "i8"),  # into Crowd.solid and Crowd.constants
+        ("block_count", "i8"),  # bodies of a mechanism
+        ("solid_count", "i8"),  # these, and with joints the world
+        ("first_joint", "i8"),  # into Model.joint_row and Crowd.joint
+        ("joint_count", "i8"),
+        ("first_entry", "i8"),  # into Crowd.joint_factor
+        ("entry_count", "i8"),
+        ("first_field", "i8"),  # into Model.field
+        ("field_count", "i8"),
+        ("gripper", "i8"),  # 1: two of the solids are the fingers of a gripper
+    ],
+    align=True,
+)
+
 # columns of Crowd.frame
 POSITION, ROTATION, VELOCITY, ANGULAR_VELOCITY = 0, 3, 12, 15
 DISPLACEMENT, ROTATION_BOUND, FRAME_WIDTH = 18, 21, 24
@@ -80,9 +98,18 @@ class Pairs(NamedTuple):
 class Crowd(NamedTuple):
     """One world of many bodies.
 
+    A block is LANES dynamic bodies side by side. The blocks of a group are coupled, lane by lane.
+
     Attributes:
-        constants: [blocks] of DYNAMIC, a value per lane: LANES bodies side by side.
+        constants: [blocks] of DYNAMIC, a value per lane.
         solid: [blocks] of SOLID.
+        group: [groups] of BODY_GROUP.
+        present: [groups, LANES] 1: the lane holds bodies of the scene; 0: a copy of other ones.
+        body: [blocks * LANES] dynamic body at each place, or the one that is copied; -1: none.
+        place: [dynamic bodies] the reverse.
+        joint: [rows of joints] of JOINT_WORK.
+        joint_factor: [entries, LANES].
+        motor: [groups * LANES, most motors, 2] see `State.motor`.
         frame: [places, FRAME_WIDTH] of each solid side by side: position, rotation matrix,
             velocity, angular velocity, and displacement and rotation bound of the last drift.
         tensor: [places, 8] inverse inertia in the world frame: xx yy zz xy xz yz; impulse law.
@@ -96,10 +123,18 @@ class Crowd(NamedTuple):
         colour_first: [MOST_COLOURS + 2] into `order`.
         pair_kind: [kinds] of PAIR_KIND.
         stirred: [blocks * LANES] when an impact last changed a body's velocity; impulse law.
+        joint_work: [groups] J, of the joints' impulses in a collision; impulse law.
     """
 
     constants: Array
     solid: Array
+    group: Array
+    present: Array
+    body: Array
+    place: Array
+    joint: Array
+    joint_factor: Array
+    motor: Array
     frame: Array
     tensor: Array
     margin: Array
@@ -111,6 +146,7 @@ class Crowd(NamedTuple):
     colour_first: Array
     pair_kind: Array
     stirred: Array
+    joint_work: Array
 
 
 def no_pairs(features: Features) -> Pairs:

@@ -225,6 +225,17 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
     return rows, np.ascontiguousarray(np.concatenate(blocks).T)
 
 
+def couplings(scene: Scene) -> dict[str, bool]:
+    """The features of what acts on bodies besides contacts, by name."""
+    return {
+        "drives": bool(scene.drives),
+        "gripper": bool(scene.grippers),
+        "fields": bool(scene.fields),
+        "surface_drag": any(isinstance(field, SurfaceDrag) for field in scene.fields),
+        "joints": bool(scene.joints),
+    }
+
+
 def _features(
     scene: Scene, fidelity: Fidelity, model: Model, per_world_parameters: bool
 ) -> Features:
@@ -280,12 +291,8 @@ def _features(
         cylinder=CYLINDER in kinds,
         torus=TORUS in kinds,
         axial=bool(np.any(model.half_pair["axial"])),
-        drives=bool(scene.drives),
-        gripper=bool(scene.grippers),
-        fields=bool(scene.fields),
-        surface_drag=any(isinstance(field, SurfaceDrag) for field in scene.fields),
         wrench=False,
-        joints=bool(scene.joints),
+        **couplings(scene),
         compound=len(model.compound_part) > 0,
         per_world_parameters=per_world_parameters,
         time_control=TIME_CONTROLS.index(fidelity.time_control) if len(model.half_pair) else FIXED,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from physics.model.groups import Groups
 from physics.model.tables import (
     ALONG,
     ANGLE,
@@ -40,12 +41,13 @@ def joint_rows(scene: Scene, world: int) -> Array:
             (last if j in looped and row["role"] != EQUALITY else rows).append(row)
     rows += last
     table = np.array(rows, dtype=JOINT_ROW)
+    first_of_body: dict[int, int] = {}
     entries = 0
     for r in range(len(table)):
         ends = {int(table["a"][r]), int(table["b"][r])} - {world}
-        coupled = [s for s in range(r + 1) if ends & {int(table["a"][s]), int(table["b"][s])}]
-        table["first"][r], table["entry"][r] = coupled[0], entries
-        entries += r - coupled[0]
+        first = min(first_of_body.setdefault(end, r) for end in ends)
+        table["first"][r], table["entry"][r] = first, entries
+        entries += r - first
     return table
 
 
@@ -101,18 +103,15 @@ def _direction(axis: Any) -> Array:
 
 def _joints_in_loops(scene: Scene) -> set[int]:
     """Indices of all joints of those groups of bodies in which joints form closed loops."""
-    group: dict[int | None, int] = {}  # of each body; None stands for the world and for drives
-    looped: set[int] = set()
-    for joint in scene.joints:
-        one, other = scene.joint_ends(joint)
-        if other is not None and other >= len(scene.bodies):
-            other = None
-        a, b = (group.setdefault(end, len(group)) for end in (one, other))
-        if a == b or b in looped:
-            looped.add(a)
-        group = {end: a if g == b else g for end, g in group.items()}
-    ends = (scene.joint_ends(joint)[0] for joint in scene.joints)
-    return {j for j, a in enumerate(ends) if group[a] in looped}
+    # the world and all drives are one solid here, as none of them yields
+    ends = [
+        (a, -1 if b is None or b >= len(scene.bodies) else b)
+        for a, b in (scene.joint_ends(joint) for joint in scene.joints)
+    ]
+    group = Groups()
+    closing = [a for a, b in ends if not group.unite(a, b)]
+    looped = {group.of(a) for a in closing}
+    return {j for j, (a, _) in enumerate(ends) if group.of(a) in looped}
 
 
 def held_axes(scene: Scene) -> list[tuple[int, int, int | None, Array]]:

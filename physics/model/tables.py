@@ -217,6 +217,11 @@ JOINT_ROW = np.dtype(
     ],
     align=True,
 )
+# those of mechanisms side by side differ between lanes, see manybody/mechanisms.py
+JOINT_ROW_PER_LANE = (
+    "point_a", "point_b", "axis_a", "axis_b", "pivot", "target", "scale", "force_limit",
+    "frequency", "middle", "limits",
+)  # fmt: skip
 
 
 class Model(NamedTuple):

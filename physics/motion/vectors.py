@@ -1,6 +1,6 @@
 """Products of 3-vectors, rotation matrices and symmetric tensors whose entries stand in lanes."""
 
-from physics.compiler.jit import stage
+from physics.compiler.jit import at, stage
 
 
 @stage
@@ -17,6 +17,12 @@ def rotated(R, i, x, y, z):
         R[3, i] * x + R[4, i] * y + R[5, i] * z,
         R[6, i] * x + R[7, i] * y + R[8, i] * z,
     )
+
+
+@stage
+def rotated_at(R, i, v):
+    """R v of a constant v: one vector [3], or one per lane [3, LANES]."""
+    return rotated(R, i, at(v[0], i), at(v[1], i), at(v[2], i))
 
 
 @stage

@@ -52,7 +52,7 @@ def test_every_pair_whose_surfaces_are_nearer_than_the_margins_is_found(seed, la
     assert len(found) == len(lists.found)
     # samples of a body that are nearer to the surface of another than both margins
     margin, solids = lists._least_margin, [*simulation.scene.bodies, *simulation.scene.statics]
-    first_static = simulation.places_of_bodies
+    first_static = len(simulation.mechanisms.body)
     missed = 0
     for i, body in enumerate(simulation.scene.bodies):
         points = surface_of(body)
