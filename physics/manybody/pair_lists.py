@@ -18,11 +18,12 @@ from physics.manybody.tables import (
     ROTATION_BOUND,
     Crowd,
     Pairs,
-    check_memory,
+    bytes_with_room,
     copy_pairs,
     no_pairs,
     with_room,
 )
+from physics.model.free_memory import check_memory
 from physics.scene.scene import Scene
 from physics.scene.solids import Ground
 
@@ -175,7 +176,10 @@ class PairLists:
             max(int(used[2] + more @ kind["half_pair_count"]), len(self.pairs.work)),
         )
         batches = max(batches, len(self.pairs.kind))
-        check_memory(self.pairs, batches, *enough)
+        check_memory(
+            bytes_with_room(self.pairs, batches, *enough),
+            "the pairs of bodies that are near each other",
+        )
         self.pairs = with_room(self.pairs, self._kinds.features, batches, *enough)
         following = np.full(batches * LANES, -1)
         following[: len(self._free.next_free)] = self._free.next_free

@@ -6,7 +6,6 @@ a scene of two solids, so the stages of a lane group work on it unchanged.
 """
 
 import math
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -175,35 +174,14 @@ def _sizes(batches: int, slots: int, work: int) -> dict[str, tuple[int, int]]:
     return {"candidate": (1, slots), "sample_id": (1, slots), "work": (0, work)}
 
 
-def check_memory(pairs: Pairs, batches: int, slots: int, work: int) -> None:
-    """Raises an error if the arrays that `with_room` would make don't fit into free memory.
-
-    Raises:
-        MemoryError: names the bytes that are needed and those that are free.
-    """
+def bytes_with_room(pairs: Pairs, batches: int, slots: int, work: int) -> int:
+    """Bytes of the arrays that `with_room` would make."""
     needed = 0
     for name, array in zip(pairs._fields, pairs, strict=True):
         axis, length = _sizes(batches, slots, work).get(name, (0, batches))
         others = [n for k, n in enumerate(array.shape) if k != axis]
         needed += array.dtype.itemsize * length * math.prod(others)
-    free = _free_bytes()
-    if needed > free:
-        raise MemoryError(
-            f"the pairs of bodies that are near each other need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB of memory are free: take fewer bodies"
-        )
-
-
-def _free_bytes() -> float:
-    """Bytes of memory that are free; infinity where the system doesn't say."""
-    try:
-        available = [
-            line for line in Path("/proc/meminfo").read_text().splitlines()
-            if line.startswith("MemAvailable:")
-        ]  # fmt: skip
-        return 1024.0 * float(available[0].split()[1])
-    except (OSError, IndexError, ValueError):
-        return math.inf
+    return needed
 
 
 def with_room(pairs: Pairs, features: Features, batches: int, slots: int, work: int) -> Pairs:

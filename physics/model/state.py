@@ -7,6 +7,7 @@ import numpy as np
 from physics.compiler.jit import LANES, aligned_zeros, columns
 from physics.model.contact_memory import contact_memory
 from physics.model.features import ADAPTIVE, Features, cached_by_features
+from physics.model.free_memory import check_memory
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -135,16 +136,25 @@ class State(NamedTuple):
 
 
 def allocate(model: Model, features: Features, count: int) -> State:
-    """State arrays of `count` worlds, at rest at the origin."""
+    """State arrays of `count` worlds, at rest at the origin.
+
+    Raises:
+        MemoryError: they don't fit into free memory.
+    """
     slots = int(model.half_pair["slot_count"].sum())
     groups = -(-count // LANES)
+    candidates = candidate_dtype(features)
+    world = len(model.dynamic) * DYNAMIC_STATE.itemsize
+    world += len(model.half_pair) * HALF_PAIR_STATE.itemsize
+    group = slots * (candidates.itemsize + LANES * np.dtype(np.int32).itemsize)
+    check_memory(count * world + groups * group, f"{count} worlds of this scene")
     state = State(
         dynamic=np.zeros((count, len(model.dynamic)), dtype=DYNAMIC_STATE),
         half_pair=np.zeros((count, len(model.half_pair)), dtype=HALF_PAIR_STATE),
         touch=columns((len(model.half_pair), 5), count, float),
         world=np.zeros(count, dtype=STATUS),
         sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
-        candidate=aligned_zeros((groups, slots), candidate_dtype(features)),
+        candidate=aligned_zeros((groups, slots), candidates),
         wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
         motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1, 2)),
         pace=np.zeros(count if features.integrator == ADAPTIVE else 0, PACE),

@@ -8,6 +8,7 @@ import pytest
 
 from physics.granular.simulation import GranularSimulation
 from physics.granular.support import supports
+from physics.model import free_memory
 from physics.reference.heaps import heap_scene
 from physics.rotation import rotate
 from physics.scene.drives import Drive
@@ -214,6 +215,21 @@ def test_a_copy_continues_bitwise_equal():
     heap.restore(hidden)
     advance(heap, 200)
     assert digest(heap) == expected
+
+
+def test_a_heap_that_outgrows_memory_says_so_and_stays_as_it_was(monkeypatch):
+    sim = simulation(small_heap())
+    before = sim.state.dynamic.tobytes()
+    monkeypatch.setattr(free_memory, "free_bytes", lambda: 1e4)
+    with pytest.raises(
+        MemoryError, match=r"particles that are near .* 1e-05 GB of memory are free"
+    ):
+        advance(sim, 2000)
+    assert sim.state.dynamic.tobytes() == before
+    with pytest.raises(MemoryError, match="2 heaps of 150 bodies need"):
+        simulation(small_heap(), count=2)
+    monkeypatch.undo()
+    advance(sim, 20)
 
 
 def test_worlds_are_independent_and_masked():

@@ -25,6 +25,7 @@ from physics import (
 )
 from physics.analysis.lane_queries import LaneQueries
 from physics.manybody import simulation as many
+from physics.model import free_memory
 from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import HALF, heap, wall
 
@@ -213,6 +214,23 @@ def test_the_largest_stable_step_is_that_of_all_pairs():
     all_pairs.advance(0.1, all_pairs.everyone)
     expected = LaneQueries(all_pairs).largest_stable_step(0)
     assert world.largest_stable_step() == pytest.approx(expected, rel=3e-3)
+
+
+@pytest.mark.parametrize("law", ["balanced", "solid"])
+def test_a_world_that_outgrows_memory_says_so_and_stays_as_it_was(monkeypatch, law):
+    world = World(heap(40), law)
+    before = state_of(world)
+    monkeypatch.setattr(free_memory, "free_bytes", lambda: 1e4)
+    with pytest.raises(MemoryError, match="pairs of bodies that are near each other need"):
+        world.advance(0.02)
+    assert state_of(world) == before
+    with pytest.raises(MemoryError, match=r"3 worlds of this scene need .* take fewer bodies"):
+        World(heap(40), law, count=3)
+    monkeypatch.undo()
+    world.advance(0.02)
+    other = World(heap(40), law)
+    other.advance(0.02)
+    assert state_of(world) == state_of(other)
 
 
 def test_memory_and_pairs_grow_with_the_number_of_bodies():
