@@ -88,7 +88,7 @@ class World:
             self._simulation, self._queries = crowd, CrowdQueries(crowd)
             check_integrator(scene, self.fidelity, crowd.base)
             if not allow_unstable:
-                check_crowd(scene, self.fidelity, crowd.kinds.of_solid, crowd.mechanisms.scenes)
+                check_crowd(scene, self.fidelity, crowd.kinds.of_solid, crowd.mechanisms.checked)
         else:
             self._simulation = Simulation(*arguments)
             self._queries = LaneQueries(self._simulation)

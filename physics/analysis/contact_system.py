@@ -59,20 +59,24 @@ class ContactSystem:
         turn = rotation_matrix(bodies["orientation"])
         self._inverse_mass = constants["inverse_mass"][:, None]
         self._inverse = np.einsum("bij,bj,bkj->bik", turn, constants["inverse_inertia"], turn)
-        self._inertia = np.einsum("bij,bj,bkj->bik", turn, constants["inertia"], turn)
+        inertia = np.where(np.isfinite(constants["inertia"]), constants["inertia"], 0.0)
+        self._inertia = np.einsum("bij,bj,bkj->bik", turn, inertia, turn)  # a drive never rotates
+        self._constants = constants
 
     def largest_stable_step(self) -> float:
-        """In s; inf if nothing touches."""
-        if not len(self._kind):
+        """In s, with the servos of drives; inf if nothing touches and there are none."""
+        servos = self._constants["servo_stiffness"] + self._constants["servo_damping"]
+        if not len(self._kind) and not np.any(servos):
             return math.inf
         x = np.random.default_rng(0).normal(size=(self._count, 6))
 
         def load(h: float) -> float:
             nonlocal x  # a good start for the next step
             size, loads = 0.0, self._loads(h)
+            servo = np.array([stability.servo_load(row, h) for row in self._constants])
             for _ in range(_MOST_ITERATIONS):
                 x = x / np.sqrt(self._product(x, x))
-                y = self._accelerate(loads, x)
+                y = self._accelerate(loads, servo, x)
                 new = self._product(x, y)
                 x = y
                 if abs(new - size) <= _CONVERGED * new:
@@ -95,7 +99,7 @@ class ContactSystem:
         twist = np.array([stability.twist_load(row, h) for row in self._rows])
         return along[self._kind], across[self._kind], twist[self._kind]
 
-    def _accelerate(self, loads: tuple[Array, Array, Array], x: Array) -> Array:
+    def _accelerate(self, loads: tuple[Array, Array, Array], servo: Array, x: Array) -> Array:
         """M^-1 A x, see `analysis.stability`."""
         along, across, twist = loads
         weight, normal = self._weight, self._normal
@@ -115,6 +119,7 @@ class ContactSystem:
             own = place < self._count
             np.add.at(out[:, :3], place[own], sign * force[own])
             np.add.at(out[:, 3:], place[own], sign * (np.cross(arm, force) + torque)[own])
+        out[:, :3] += servo[:, None] * x[:, :3]
         out[:, :3] *= self._inverse_mass
         out[:, 3:] = np.einsum("bij,bj->bi", self._inverse, out[:, 3:])
         return out

@@ -75,7 +75,7 @@ def twist_load(half_pair: Any, h: float) -> float:
     return h * float(half_pair["twist_damping"]) + 0.5 * h * h * float(half_pair["twist_stiffness"])
 
 
-def _servo(dynamic: Any, h: float) -> float:
+def servo_load(dynamic: Any, h: float) -> float:
     """A in kg of a drive's servo."""
     return h * float(dynamic["servo_damping"]) + 0.5 * h * h * float(dynamic["servo_stiffness"])
 
@@ -108,7 +108,7 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
             )
         for i, dynamic in enumerate(model.dynamic):
             block = slice(6 * i, 6 * i + 3)
-            A[block, block] += _servo(dynamic, h) * np.eye(3)
+            A[block, block] += servo_load(dynamic, h) * np.eye(3)
         return largest_eigenvalue(inverse, A)
 
     return root(load)
@@ -116,7 +116,7 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
 
 def of_servo(dynamic: Any) -> float:
     """Largest stable step in s of a drive that touches nothing."""
-    return root(lambda h: _servo(dynamic, h) * float(dynamic["inverse_mass"]))
+    return root(lambda h: servo_load(dynamic, h) * float(dynamic["inverse_mass"]))
 
 
 def of_scene(scene: Scene, model: Model, features: Features, spacing: float) -> tuple[float, int]:
@@ -172,6 +172,6 @@ def _of_dynamic_body(
             each.append(max(largest_eigenvalue(inverse, A) for A in loads))
         if features.impulse:  # its contacts are stable at any step
             each = []
-        return float(sum(sorted(each)[-_PARTNERS:]) + _servo(this, h) * this["inverse_mass"])
+        return float(sum(sorted(each)[-_PARTNERS:]) + servo_load(this, h) * this["inverse_mass"])
 
     return root(load)

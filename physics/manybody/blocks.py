@@ -123,7 +123,8 @@ def count_far(crowd, m):
     for i in range(LANES):
         step = math.sqrt(d[0, i] * d[0, i] + d[1, i] * d[1, i] + d[2, i] * d[2, i]) + bound[i]
         motion[i] += step
-        far += 0 if motion[i] + step <= margin[i] else 1  # NaN counts
+        here = motion[i] + step <= margin[i] or margin[i] == math.inf  # a copy; else NaN counts
+        far += 0 if here else 1
     return far
 
 

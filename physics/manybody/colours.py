@@ -45,7 +45,8 @@ def make_by_colour(features, work):
                 if gripper:
                     first, last = share(0, crowd.group.shape[0], team)
                     for g in range(first, last):
-                        couple_fingers(crowd, g)
+                        if crowd.group[g].gripper != 0:
+                            couple_fingers(crowd, g)
                     wait(team)
         return count
 

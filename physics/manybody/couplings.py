@@ -19,7 +19,7 @@ from physics.motion.drives import CLOSING
 
 
 @stage
-def gather_speeds(crowd, g):
+def gather_group_speeds(crowd, g):
     """Copies the velocities of a group's bodies from their frames."""
     for m in blocks_of(crowd, g):
         v, omega = crowd.solid[m].velocity, crowd.solid[m].angular_velocity
@@ -31,7 +31,7 @@ def gather_speeds(crowd, g):
 
 
 @stage
-def scatter_speeds(crowd, g):
+def scatter_group_speeds(crowd, g):
     """The reverse."""
     for m in blocks_of(crowd, g):
         v, omega = crowd.solid[m].velocity, crowd.solid[m].angular_velocity
@@ -51,7 +51,11 @@ def find_in_contact(crowd, pairs, g, mask):
         for m in blocks_of(crowd, g):
             body = m * LANES + i
             for n in range(crowd.incident_first[body], crowd.incident_first[body + 1]):
-                mask[i] |= pairs.busy[(crowd.incident[n] >> 1) // LANES]
+                home = crowd.incident[n] >> 1
+                b, lane = home // LANES, home % LANES
+                first = pairs.first_work[b]
+                for k in range(first, first + crowd.pair_kind[pairs.kind[b]].half_pair_count):
+                    mask[i] = 1 if pairs.work[k].count[lane] > 0 else mask[i]
         found += mask[i]
     return found
 
@@ -86,7 +90,7 @@ def make_begin_joints(features):
             for g in range(first, last):
                 if crowd.group[g].joint_count > 0:
                     own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
-                    gather_speeds(crowd, g)
+                    gather_group_speeds(crowd, g)
                     if clears:
                         clear_hold(own, mine)
                         crowd.joint_work[g] = 0.0
@@ -118,11 +122,11 @@ def make_keep_joints(features):
                 found = find_stirred(crowd, g, since, mask)
             if found > 0:
                 own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
-                gather_speeds(crowd, g)
+                gather_group_speeds(crowd, g)
                 for i in range(LANES):
                     lane.impact_work[i] = 0.0
                 hold(own, mine, mask, motor_time, lane)
-                scatter_speeds(crowd, g)
+                scatter_group_speeds(crowd, g)
                 for i in range(LANES):
                     crowd.joint_work[g] += lane.impact_work[i]
         wait(team)
@@ -155,7 +159,10 @@ def couple_fingers(crowd, g):
         other = crowd.group[g].first_block + partner
         if partner >= 0 and other > m:
             for i in range(LANES):
-                one, two = crowd.frame[m * LANES + i], crowd.frame[other * LANES + i]
+                p, q = m * LANES + i, other * LANES + i
+                latest = max(crowd.stirred[p], crowd.stirred[q])  # both change their velocities
+                crowd.stirred[p], crowd.stirred[q] = latest, latest
+                one, two = crowd.frame[p], crowd.frame[q]
                 for c in range(3):
                     if c != CLOSING:
                         mean = 0.5 * (one[VELOCITY + c] + two[VELOCITY + c])

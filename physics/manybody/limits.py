@@ -14,6 +14,9 @@ from physics.scene.solids import Body, touch_each_other
 
 Array = np.ndarray
 
+# the fields of a mechanism, and the mechanism as a scene of its own
+Checked = tuple[list[int], Scene]
+
 # solids that can touch a body at once, see `analysis.stability`
 _NEIGHBOURS = 6
 # kinds of the lightest and of the heaviest bodies that are checked where there are many
@@ -21,7 +24,7 @@ _MOST = 8
 
 
 def check_crowd(
-    scene: Scene, fidelity: Fidelity, of_solid: Array, mechanisms: tuple[Scene, ...] = ()
+    scene: Scene, fidelity: Fidelity, of_solid: Array, mechanisms: tuple[Checked, ...] = ()
 ) -> None:
     """Raises an error if the substep is too long for a scene of many bodies.
 
@@ -34,7 +37,7 @@ def check_crowd(
         scene: what is in each world.
         fidelity: of the physics.
         of_solid: [solids] kind of each: bodies, drives, statics.
-        mechanisms: one of each structure.
+        mechanisms: see `Mechanisms.checked`.
 
     Raises:
         ValueError: see `analysis.step_limits.check_step`.
@@ -55,8 +58,25 @@ def check_crowd(
             if touch_each_other(own, dynamic[m]):
                 around = _named(dynamic[m], None)
                 _check([own, *([around] * _NEIGHBOURS)], statics, scene, fidelity)
-    for mechanism in mechanisms if scene.fields or scene.drives else ():
-        check_step(mechanism, fidelity, *build(mechanism, fidelity))
+    for fields, mechanism in mechanisms if scene.fields or scene.drives else ():
+        _check_mechanism(scene, fidelity, fields, mechanism)
+
+
+def _check_mechanism(scene: Scene, fidelity: Fidelity, fields: list[int], part: Scene) -> None:
+    """Checks servos and fields; contacts are checked by kind, so here no solids touch."""
+    quiet = replace(
+        part,
+        bodies=[replace(body, density=None, mask=0) for body in part.bodies],
+        drives=[replace(drive, mask=0) for drive in part.drives],
+    )
+    try:
+        check_step(quiet, fidelity, *build(quiet, fidelity))
+    except ValueError as error:
+        message = str(error)
+        for k, n in enumerate(fields):  # as they are numbered in the whole scene
+            own = f"Scene.fields[{k}], {part.fields[k]!r},"
+            message = message.replace(own, f"Scene.fields[{n}], {scene.fields[n]!r},")
+        raise ValueError(message) from None
 
 
 def _named(solid: Body | Drive, name: str | None) -> Body | Drive:

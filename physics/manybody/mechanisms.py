@@ -1,7 +1,8 @@
 """Mechanisms: bodies that joints, grippers or springs couple, and how they stand side by side.
 
 Within a mechanism the stages of a lane group do all the work, as for a small scene. Mechanisms of
-the same structure stand in the lanes of one body group, whatever their sizes and anchors. A body
+the same structure stand in the lanes of one body group, whatever their masses, sizes, anchors and
+motors; fields that name bodies must be equal. A body
 that nothing couples is a mechanism of its own. Between mechanisms there are only contacts.
 """
 
@@ -39,7 +40,8 @@ class Mechanisms(NamedTuple):
         field: [n] of FIELD, of all groups.
         surface_point: [7, p] see `Model.surface_point`.
         motor: [motors, 2] row and column of `Crowd.motor` of each motor, in scene order.
-        scenes: one mechanism of each group that isn't a body alone, as a scene.
+        checked: of all mechanisms of the same structure and masses the fields of one, and it as a
+            scene of its own: what its servos and fields need of a step.
     """
 
     group: Array
@@ -51,7 +53,7 @@ class Mechanisms(NamedTuple):
     field: Array
     surface_point: Array
     motor: Array
-    scenes: tuple[Scene, ...]
+    checked: tuple[tuple[list[int], Scene], ...]
 
     @property
     def most_blocks(self) -> int:
@@ -60,10 +62,11 @@ class Mechanisms(NamedTuple):
 
 
 class _One(NamedTuple):
-    """One mechanism: its bodies, its joints, and its tables as those of a scene of its own."""
+    """One mechanism: what it consists of, and its tables as those of a scene of its own."""
 
     members: list[int]
     joints: list[int]
+    fields: list[int]
     scene: Scene
     dynamic: Array
     joint_row: Array
@@ -87,16 +90,22 @@ def find_mechanisms(scene: Scene) -> Mechanisms:
     """The mechanisms of a scene's bodies and drives, those of the same structure side by side."""
     alike: dict[Any, list[_One]] = {}
     lone: dict[Any, _One] = {}
+    named = {f for f, field in enumerate(scene.fields) if _bodies_of(scene, field)}
     for members, joints, fields in _components(scene):
         key = None
-        if len(members) == 1 and not joints and members[0] < len(scene.bodies):
-            key = scene.bodies[members[0]].shape if scene.fields else None, tuple(fields)
-        if key in lone:  # tables of bodies alone are equal
+        if (
+            len(members) == 1
+            and members[0] < len(scene.bodies)
+            and not (joints or named & {*fields})
+        ):
+            body = scene.bodies[members[0]]  # what acts on it acts on all bodies
+            key = (body.shape, body.mass) if scene.fields else None, True
+        if key in lone:
             one = lone[key]._replace(members=members)
         else:
             one = _one(scene, members, joints, fields)
             lone.update({} if key is None else {key: one})
-        alike.setdefault(one.structure if key is None else key, []).append(one)
+        alike.setdefault(one.structure, []).append(one)
     return _side_by_side(scene, list(alike.values()))
 
 
@@ -135,14 +144,19 @@ def _bodies_of(scene: Scene, field: Any) -> list[int]:
 def _one(scene: Scene, members: list[int], joints: list[int], fields: list[int]) -> _One:
     """A mechanism as a scene of its own, and the tables of that."""
     local = {n: k for k, n in enumerate(members)}
-    first, drives = len(scene.bodies), []
+    first = len(scene.bodies)
+    drives: list[Any] = []
     for drive in scene.drives:
-        drives += [drive] if first in local else []
+        if first in local and isinstance(drive, Gripper):
+            drives.append(replace(drive, name=drive.name or f"drive {first - len(scene.bodies)}"))
+        elif first in local:
+            drives.append(replace(drive, name=scene.solid_names[first]))
         first += 2 if isinstance(drive, Gripper) else 1
     own_joints = []
     for joint in (scene.joints[j] for j in joints):
         a, b = scene.joint_ends(joint)
         own_joints.append(replace(joint, a=local[a], b=None if b is None else local[b]))
+    names = scene.solid_names  # the default ones would be counted anew
     own_fields: list[Any] = []
     for field in (scene.fields[f] for f in fields):
         ends = [local[n] for n in _bodies_of(scene, field)]
@@ -153,7 +167,11 @@ def _one(scene: Scene, members: list[int], joints: list[int], fields: list[int])
         else:
             own_fields.append(replace(field, body=ends[0]))
     part = Scene(
-        bodies=[scene.bodies[n] for n in members if n < len(scene.bodies)],
+        bodies=[
+            replace(scene.bodies[n], name=names[n], density=None)
+            for n in members
+            if n < len(scene.bodies)
+        ],
         drives=drives,
         gravity=scene.gravity,
         joints=own_joints,
@@ -161,7 +179,7 @@ def _one(scene: Scene, members: list[int], joints: list[int], fields: list[int])
     )
     field_table, points = field_rows(part)
     rows = joint_rows(part, len(members))
-    return _One(members, joints, part, dynamic_rows(part), rows, field_table, points)
+    return _One(members, joints, fields, part, dynamic_rows(part), rows, field_table, points)
 
 
 def _side_by_side(scene: Scene, kinds: list[list[_One]]) -> Mechanisms:
@@ -200,6 +218,11 @@ def _side_by_side(scene: Scene, kinds: list[list[_One]]) -> Mechanisms:
             joint_rows_of.append(_laned([one.joint_row for one in filled]))
             blocks, joints, entries = blocks + solids, joints + rows, entries + own_entries
         field_count += len(field)
+    differing: dict[Any, _One] = {}
+    for k, kind in enumerate(kinds):
+        for one in kind:
+            masses = tuple((body.shape, body.mass) for body in one.scene.bodies)
+            differing.setdefault((k, masses), one)
     return Mechanisms(
         group=np.array(groups, dtype=BODY_GROUP),
         present=np.array(present, dtype=np.int64),
@@ -210,7 +233,7 @@ def _side_by_side(scene: Scene, kinds: list[list[_One]]) -> Mechanisms:
         field=np.concatenate(fields),
         surface_point=np.ascontiguousarray(np.concatenate(points, axis=1)),
         motor=motor,
-        scenes=tuple(kind[0].scene for kind in kinds),
+        checked=tuple((one.fields, one.scene) for one in differing.values()),
     )
 
 

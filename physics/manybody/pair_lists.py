@@ -68,7 +68,7 @@ class PairLists:
         self._reach = of_place([0.0 if s is None else s.reach for s in shapes], 0.0)
         margin = of_place([0.0 if s is None else NEAR_MARGIN * s.width for s in shapes], 0.0)
         margin[self._bodies :] = 0.0
-        # copies of bodies, and drives that nothing can touch, may go anywhere
+        # copies of bodies may go anywhere
         self._least_margin = np.where(self._kind < 0, np.inf, margin)
         self._grid, self._counts = Grid.of(self._places), np.zeros(self._places + 1, np.int64)
         self._room = np.zeros(8 * self._places, np.int64)

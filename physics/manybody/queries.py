@@ -139,9 +139,9 @@ class CrowdQueries:
     def largest_stable_step(self, world: int) -> float:
         """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         simulation = self._simulation
-        if simulation.features.impulse:
-            return math.inf
         found = self._touching(world)
+        if simulation.features.impulse:  # contacts limit nothing, servos do
+            found = found[:0]
         kinds, kind = np.unique(found["half_pair"], return_inverse=True)
         rows, ends = simulation.kinds.model.half_pair[kinds], [found["owner"], found["surface"]]
         return ContactSystem(

@@ -209,7 +209,7 @@ class CrowdSimulation(Simulation):
                 needed = int(progress[3])
                 self._rows = aligned_zeros(needed + needed // 4, CONTACT_ROW)
                 continue
-            finite = bool(np.isfinite(crowd.frame).all())
+            finite = bool(np.isfinite(crowd.frame[crowd.place]).all())
             if finite:
                 crowd = lists.search(crowd)
         diverged = self._store(self.state.dynamic, w, crowd)
@@ -237,7 +237,8 @@ class CrowdSimulation(Simulation):
         self, crowd: Crowd, lists: PairLists, w: int, h: float, substeps: int, progress: Array
     ) -> None:
         """Runs the kernel on as many threads as pay."""
-        threads = self.threads if len(crowd.order) >= _FEWEST_BATCHES else 1
+        work = max(len(crowd.order), len(crowd.group))
+        threads = self.threads if work >= _FEWEST_BATCHES else 1
         while len(self._idle) < threads:
             self._idle.append(self.working_memory())
         state = self.state._replace(world=self.state.world[w : w + 1])
@@ -300,7 +301,9 @@ class CrowdSimulation(Simulation):
     def working_memory(self) -> Workspace:
         """Of one thread, for any kind of pair."""
         kinds = self.kinds
-        whole = Workspace.of(kinds.model, self.features)
+        # joints have theirs in `Crowd`
+        model = kinds.model._replace(joint_row=kinds.model.joint_row[:0])
+        whole = Workspace.of(model, self.features)
         parts = int(kinds.pair_kind["part_count"].max(initial=0))
         return whole._replace(
             solid=aligned_zeros(2 + parts, SOLID),

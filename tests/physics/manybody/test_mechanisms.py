@@ -26,6 +26,7 @@ from physics import (
     SurfaceDrag,
     World,
 )  # fmt: skip
+from physics.analysis.lane_queries import LaneQueries
 from physics.manybody import simulation as many
 from physics.manybody.mechanisms import find_mechanisms
 from physics.motion.drive_commands import make_move_command, worlds_last
@@ -164,8 +165,52 @@ def test_a_body_that_diverges_is_named_wherever_it_stands():
         world.advance(STEP)
 
 
-def test_a_servo_too_fast_for_the_step_is_refused_among_many_bodies():
-    bodies = [cube(0.1 * k, 0.0) for k in range(33)]
-    drive = Drive(Sphere(HALF), 0.1, 5.0, (0.0, 1.0, 1.0), frequency=1e5)
-    with pytest.raises(ValueError, match=r"Drive\.frequency 100000 rad/s of drive 0"):
-        World(Scene(bodies, [Ground()], drives=[drive]))
+def test_what_makes_a_step_too_long_is_named_as_in_the_scene():
+    bodies = [cube(0.1 * k, 0.0) for k in range(34)]
+    slow = [Drive(Sphere(HALF), 0.1, 5.0, (0.1 * k, 1.0, 1.0)) for k in range(2)]
+    fast = Drive(Sphere(HALF), 0.1, 5.0, (0.0, 1.0, 1.0), frequency=1e5)
+    with pytest.raises(ValueError, match=r"Drive\.frequency 100000 rad/s of drive 2"):
+        World(Scene(bodies, [Ground()], drives=[*slow, fast]))
+    springs = [PointSpring(3, stiffness=1.0), Drag(linear=0.1), PointSpring(7, stiffness=1e9)]
+    with pytest.raises(ValueError, match=r"Scene\.fields\[2\], PointSpring\(body=7"):
+        World(Scene(bodies, [Ground()], fields=springs))
+    light = cube(5.0, 5.0, density=0.01)
+    for order in ([light, *bodies], [*bodies, light]):  # a drag that only the light one can't bear
+        with pytest.raises(ValueError, match=r"Scene\.fields\[0\], Drag"):
+            World(Scene(order, [Ground()], fields=[Drag(linear=2.0)]))
+
+
+def test_default_names_of_the_scene_are_kept():
+    others = [cube(0.1 * k, 1.0, 5.0) for k in range(32)]
+    bodies = [cube(0, 0, 5, name="x"), cube(0.1, 0, 5), cube(0.2, 0, 5, name="body 0")]
+    World(Scene([*bodies, *others], joints=[BallJoint(1, 2, anchor=(0.15, 0.0, 5.0))]))
+
+
+def test_the_largest_stable_step_knows_servos():
+    scene, law = workshop(), "balanced"
+    world = World(scene, law)
+    world.advance(STEP)
+    all_pairs = Simulation(scene, world.fidelity, 1, 1, False)
+    all_pairs.advance(STEP, all_pairs.everyone)
+    expected = LaneQueries(all_pairs).largest_stable_step(0)
+    assert world.largest_stable_step(0) == pytest.approx(expected, rel=0.01)
+    drive = Drive(Sphere(HALF), 0.1, 5.0, (0.0, 1.0, 1.0))
+    alone = World(Scene([cube(0.1 * k, 0.0, 9.0) for k in range(33)], drives=[drive]), "solid")
+    assert 1e-3 < alone.largest_stable_step(0) < 1.0
+
+
+def test_copies_that_fill_lanes_do_not_fail_a_world():
+    # the attractor presses bodies onto the ground; copies have no contacts and run away
+    bodies = [cube(0.05 * (k % 6) - 0.125, 0.05 * (k // 6) - 0.125) for k in range(33)]
+    field = Attractor((0.0, 0.0, 1.0), -100.0, exponent=-1.0)
+    world = World(Scene(bodies, [Ground(ROUGH)], fields=[field]), allow_unstable=True)
+    world.advance(0.1)
+    solid = world._simulation._worlds[0][0].solid
+    copies = np.flatnonzero(world._simulation.mechanisms.present.ravel() == 0)
+    assert len(copies) == 15
+    world._simulation._load = lambda dynamic, w, crowd, load=world._simulation._load: (
+        load(dynamic, w, crowd),
+        solid["momentum"][-1, 0].__setitem__(15, np.inf),
+    )
+    world.advance(0.1)
+    assert np.isfinite(world.position).all()
