@@ -2,8 +2,8 @@
 
 Within a mechanism the stages of a lane group do all the work, as for a small scene. Mechanisms of
 the same structure stand in the lanes of one body group, whatever their masses, sizes, anchors and
-motors; fields that name bodies must be equal. A body
-that nothing couples is a mechanism of its own. Between mechanisms there are only contacts.
+motors; fields that name bodies must be equal. A body that nothing couples is a mechanism of its
+own. Between mechanisms there are only contacts.
 """
 
 from dataclasses import replace
@@ -99,7 +99,7 @@ def find_mechanisms(scene: Scene) -> Mechanisms:
             and not (joints or named & {*fields})
         ):
             body = scene.bodies[members[0]]  # what acts on it acts on all bodies
-            key = (body.shape, body.mass) if scene.fields else None, True
+            key = (body.shape, body.mass) if scene.fields else ("body",)
         if key in lone:
             one = lone[key]._replace(members=members)
         else:
@@ -156,7 +156,7 @@ def _one(scene: Scene, members: list[int], joints: list[int], fields: list[int])
     for joint in (scene.joints[j] for j in joints):
         a, b = scene.joint_ends(joint)
         own_joints.append(replace(joint, a=local[a], b=None if b is None else local[b]))
-    names = scene.solid_names  # the default ones would be counted anew
+    names = scene.solid_names  # a part would number unnamed bodies from 0 again
     own_fields: list[Any] = []
     for field in (scene.fields[f] for f in fields):
         ends = [local[n] for n in _bodies_of(scene, field)]
