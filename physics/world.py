@@ -18,7 +18,7 @@ from physics.analysis.step_limits import check_step
 from physics.granular.queries import GranularQueries
 from physics.granular.simulation import GranularSimulation
 from physics.granular.support import supports
-from physics.manybody.limits import check_crowd
+from physics.manybody.limits import check_crowd, check_impacts
 from physics.manybody.queries import CrowdQueries
 from physics.manybody.simulation import CrowdSimulation, is_crowd
 from physics.model.features import Features
@@ -89,6 +89,7 @@ class World:
             check_integrator(scene, self.fidelity, crowd.base)
             if not allow_unstable:
                 check_crowd(scene, self.fidelity, crowd.kinds.of_solid, crowd.mechanisms.checked)
+                check_impacts(scene, self.fidelity, crowd.kinds)
         else:
             self._simulation = Simulation(*arguments)
             self._queries = LaneQueries(self._simulation)

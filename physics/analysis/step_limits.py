@@ -29,7 +29,9 @@ def check_step(scene: Scene, fidelity: Fidelity, model: Model, features: Feature
             solid that limits it and the largest safe step), or a spring or drag of `Scene.fields`
             does, or a body would sink into the ground.
     """
-    check_time_control(scene, fidelity, model, features)
+    sides = np.stack([model.half_pair["owner"], model.half_pair["surface"]], axis=1)
+    names = np.array(scene.solid_names)[sides]
+    check_time_control(scene, fidelity, model.half_pair, names, features)
     _check_sink(scene, fidelity, model)
     _check_servos(scene, fidelity, model)
     _check_fields(scene, fidelity, model)

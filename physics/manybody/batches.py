@@ -25,9 +25,9 @@ from physics.spring.contacts import make_contacts
 @stage
 def model_of(model, kind):
     """The tables of one kind of pair."""
-    first, part = kind.first_half_pair, kind.first_part
+    first, part, solid = kind.first_half_pair, kind.first_part, kind.first_dynamic
     return Model(
-        model.dynamic,
+        model.dynamic[solid : solid + 2],
         model.half_pair[first : first + kind.half_pair_count],
         model.compound_part[part : part + kind.part_count],
         model.hidden_face,
@@ -61,7 +61,7 @@ def workspace_of(workspace, pairs, kind, b, rows, first_row, row_count):
         workspace.start,
         workspace.trial,
         workspace.pace,
-        workspace.timing,
+        pairs.timing[first : first + kind.half_pair_count],
         workspace.clock,
         workspace.kept,
     )

@@ -73,7 +73,7 @@ def group_workspace(workspace, crowd, g):
         workspace.pace,
         workspace.timing,
         workspace.clock,
-        workspace.kept,
+        crowd.kept[:, group.first_block : group.first_block + group.solid_count],
     )
 
 

@@ -66,7 +66,7 @@ def clear_lane(row, i, remaining_skin):
 def make_merge(features: Features):
     """Entry point: which pairs of a new list have homes; releases the homes of the others."""
     sources = SOURCES
-    clear = make_clear(features)
+    clear, timed = make_clear(features), features.finds_impacts
 
     @entry
     def merge(model, pairs, pair_kind, free, bodies, places, old, old_homes, new, homes):
@@ -90,6 +90,8 @@ def make_merge(features: Features):
                 for c in range(row.count[i]):
                     clear(pairs.candidate[0, slot + c], i)
                 clear_lane(row, i, FOREVER)
+                if timed:
+                    pairs.timing[pairs.first_work[b] + k].impulse[i] = 0.0
                 slots = 0
                 for lane in range(LANES):
                     slots = max(slots, row.count[lane])

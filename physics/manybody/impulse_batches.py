@@ -33,6 +33,8 @@ from physics.manybody.batches import (
 from physics.manybody.tables import ANGULAR_VELOCITY, VELOCITY
 from physics.model.features import cached_by_features
 from physics.model.lanes import update_previous
+from physics.model.workspace import FREE, GIVEN, MEETS
+from physics.step.event_steps import expect_impacts
 
 
 @stage
@@ -104,11 +106,12 @@ def make_list_contacts(features):
 
 @cached_by_features
 def make_prepare_batch(features):
-    """Sequence that writes the contact rows of a batch."""
+    """Sequence that writes the contact rows of a batch; `meets`: at an impact within a substep."""
     contact_rows, compound_frames = make_contact_rows(features), make_compound_frames(features)
+    timed = features.finds_impacts
 
     @sequence
-    def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h, remembers):
+    def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h, remembers, meets):
         model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         own = state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b)
         mark_lanes(workspace.lane[0], pairs.first[b], remembers)
@@ -120,6 +123,10 @@ def make_prepare_batch(features):
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
                 contact_rows(model, own, mine, 0, k, workspace.lane[0].updates_memory, h)
+        if timed:
+            for i in range(LANES):
+                workspace.clock[0].phase[i] = MEETS if meets else FREE
+            expect_impacts(model, mine, not meets)
 
     return prepare_batch
 
@@ -265,13 +272,18 @@ def make_restitution_batch(features):
 
 @cached_by_features
 def make_book_impacts(features):
-    """Sequence that adds up the impact impulses of a batch, for the momenta of its solids."""
-    apply_impacts = make_apply_impacts(features)
+    """Sequence that adds up the impact impulses of a batch, for the momenta of its solids.
+
+    With time control, those of a refresh are known apart from the forces, see `Workspace.kept`.
+    """
+    apply_impacts, timed = make_apply_impacts(features), features.finds_impacts
 
     @sequence
     def book_impacts(all_model, workspace, rows, crowd, pairs, b, refresh):
         model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
         one, two = workspace.solid[0], workspace.solid[1]
+        if timed and refresh:
+            one, two = workspace.kept[GIVEN, 0], workspace.kept[GIVEN, 1]
         for c in range(3):
             for i in range(LANES):
                 one.momentum[c, i] = 0.0

@@ -15,12 +15,16 @@ from physics.manybody.blocks import (
     make_end_step,
     make_hold_joints,
     make_known_forces,
-    make_move_group,
     make_place_group,
     write_tensors,
 )
 from physics.manybody.colours import make_by_colour
 from physics.manybody.couplings import make_begin_joints, make_end_joints, make_keep_joints
+from physics.manybody.impact_paths import (
+    count_batch_impulses,
+    make_advance_bodies,
+    make_leave_impact,
+)
 from physics.manybody.impact_steps import make_collide, make_find
 from physics.manybody.impulse_batches import (
     make_finish_batch,
@@ -30,12 +34,16 @@ from physics.manybody.impulse_batches import (
     make_warm_batch,
 )
 from physics.manybody.spring_steps import REFRESH, RESUME, STEP
-from physics.manybody.team import FAR, Team, share, takes_batch, total, wait
+from physics.manybody.team import Team, share, takes_batch, wait
 from physics.model.features import EULER, Features
 from physics.model.state import STARTS_ANEW
+from physics.model.workspace import GIVEN
 
-# what a call continues with, besides those of the spring law: there is room for all contact rows
-ROWS = 3
+# what a call continues with, besides those of the spring law: there is room for all contact rows;
+# and, with time control, the way through a substep
+ROWS, PATH = 3, 4
+# for what there weren't enough rows, if not for a substep: a refresh, an impact within a substep
+_OF_REFRESH, _OF_IMPACT = 1, 2
 
 
 @stage
@@ -53,7 +61,8 @@ def place_rows(crowd, pairs):
 def make_impulse_steps(features: Features):
     """Entry point: as `make_spring_steps`, with contact rows that all threads share."""
     sources = SOURCES
-    move_group, place_group = make_move_group(features), make_place_group(features)
+    advance_bodies, place_group = make_advance_bodies(features), make_place_group(features)
+    timed, leave_impact = features.finds_impacts, make_leave_impact(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     list_contacts, prepare_batch = make_list_contacts(features), make_prepare_batch(features)
     find, collide = make_find(features), make_collide(features)
@@ -79,32 +88,34 @@ def make_impulse_steps(features: Features):
         done, phase, stamp = progress[0], progress[1], progress[4]
         wait(team)  # before any thread writes the progress
         while done < substeps or phase != STEP:
-            refresh = phase == REFRESH or (phase == ROWS and progress[5] != 0)
-            if phase == STEP:
-                far = 0
-                for g in range(first, last):
-                    far += move_group(model, workspace, crowd, g, before * h, h)
-                shared[thread, FAR] = far
-                if total(team, FAR) > 0:
+            refresh = phase == REFRESH or (phase == ROWS and progress[5] == _OF_REFRESH)
+            meets = phase == ROWS and progress[5] == _OF_IMPACT
+            if phase in (STEP, PATH):
+                far, meets = advance_bodies(
+                    model, workspace, crowd, pairs, before * h, h, phase == STEP, team
+                )
+                if far > 0:
                     if thread == 0:
-                        progress[0], progress[1], progress[2] = done, RESUME, 1
+                        progress[0], progress[1], progress[2] = done, PATH if timed else RESUME, 1
                         progress[4] = stamp
                     return
             elif phase == REFRESH:
                 for g in range(first, last):
                     place_group(model, workspace, crowd, g)
                 wait(team)
+            lagging = 0.0 if refresh or meets else lag * h
             span, drifted = (before * h, 0.0) if refresh else (h, h)
             elapsed = done * h + drifted
             remembers = not refresh or progress[6] == STARTS_ANEW
-            starts = not refresh and done > 0 and done % collision_substeps == 0
+            starts = not (refresh or meets) and done > 0 and done % collision_substeps == 0
             if phase != ROWS:
                 for n in range(batches):
                     if takes_batch(n, team):
                         list_contacts(model, state, workspace, crowd, pairs, crowd.order[n], starts)
                 for g in range(first, last):
-                    known_forces(model, workspace, crowd, g, drifted)
-                    hold_joints(model, state, workspace, crowd, g, h, drifted)
+                    if not meets:
+                        known_forces(model, workspace, crowd, g, drifted)
+                        hold_joints(model, state, workspace, crowd, g, h, drifted)
                     for m in blocks_of(crowd, g):
                         write_tensors(crowd, m)
             wait(team)
@@ -115,19 +126,21 @@ def make_impulse_steps(features: Features):
                 wait(team)
                 if thread == 0:
                     progress[0], progress[1], progress[2] = done, ROWS, 2
-                    progress[4], progress[5] = stamp, 1 if refresh else 0
+                    progress[4], progress[5] = stamp, _OF_IMPACT if meets else int(refresh)
                 return
             for n in range(batches):
                 b = crowd.order[n]
                 if takes_batch(n, team) and pairs.busy[b] != 0:
-                    prepare_batch(model, state, workspace, rows, crowd, pairs, b, span, remembers)
+                    prepare_batch(
+                        model, state, workspace, rows, crowd, pairs, b, span, remembers, meets
+                    )
             wait(team)
             if joints:  # see `restitution.make_find_impacts`
                 find(model, workspace, rows, crowd, pairs, span, team, stamp, True)
             # velocities are half a step old; bodies collide with the present ones
             for g in range(first, last):
                 for m in blocks_of(crowd, g):
-                    change_velocities(crowd, m, lag * drifted)
+                    change_velocities(crowd, m, lagging)
             wait(team)
             stamp, collided = collide(
                 model, workspace, rows, crowd, pairs, span, drifted == 0.0, team, stamp
@@ -136,11 +149,18 @@ def make_impulse_steps(features: Features):
                 end_joints(model, workspace, crowd, span if refresh else 0.0, team)
             for g in range(first, last):
                 for m in blocks_of(crowd, g):
-                    if collided and not refresh:
-                        solid = crowd.solid[m]
+                    solid = crowd.solid[m]
+                    if timed and refresh:
+                        solid = crowd.kept[GIVEN, m]
+                    if collided and (timed or not refresh):
                         add_contacts(crowd, pairs, m, solid.momentum, solid.angular_momentum)
-                    change_velocities(crowd, m, -lag * drifted)
+                    change_velocities(crowd, m, -lagging)
             wait(team)
+            if timed and meets:
+                began = state.world[0].time + done * h
+                leave_impact(model, workspace, rows, crowd, pairs, h, began, collided, team)
+                phase = PATH
+                continue
             for soft in range(2):
                 if soft == 1:
                     for g in range(first, last):
@@ -160,6 +180,10 @@ def make_impulse_steps(features: Features):
                     finish_batch(
                         model, state, workspace, rows, crowd, pairs, b, span, elapsed, remembers
                     )
+            if timed and not refresh:
+                for n in range(batches):
+                    if takes_batch(n, team):
+                        count_batch_impulses(model, workspace, crowd, pairs, crowd.order[n], h)
             wait(team)
             for g in range(first, last):
                 for m in blocks_of(crowd, g):

@@ -31,7 +31,7 @@ class Kinds(NamedTuple):
         of_solid: [solids] kind of each: of the bodies, the drives, then of the statics.
         pair: [kinds, kinds] row of `pair_kind`; -1 where solids can't touch. Symmetric.
         pair_kind: of PAIR_KIND.
-        model: tables of all kinds of pairs, one after the other; solids of a pair are rows 0 and 1.
+        model: tables of all kinds of pairs, one after the other; of each two solids, 0 and 1.
         features: what any of them needs.
     """
 
@@ -66,7 +66,8 @@ def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
             pair[i, j] = pair[j, i] = len(rows)
             half_pairs, _, parts = (int(n) for n in sizes)
             slots = int(model.half_pair["slot_count"].sum())
-            rows.append((half_pairs, len(model.half_pair), slots, parts, len(model.compound_part)))
+            counted = len(model.half_pair), slots, parts, len(model.compound_part)
+            rows.append((half_pairs, *counted, 2 * len(rows)))
             built.append((model, features))
             sizes += (len(model.half_pair), model.sample.shape[1], len(model.compound_part))
     if not built:
@@ -132,7 +133,9 @@ def _joined(models: list[Model]) -> Model:
         faces += len(model.hidden_face)
     half_pairs, parts, rows = (np.concatenate(column) for column in zip(*tables, strict=True))
     first = models[0]
-    dynamic = np.zeros(2, first.dynamic.dtype)  # of a pair: one row for each solid
+    dynamic = np.zeros(2 * len(models), first.dynamic.dtype)  # zero where a solid is static
+    for n, model in enumerate(models):
+        dynamic[2 * n : 2 * n + len(model.dynamic)] = model.dynamic
     return first._replace(
         dynamic=dynamic,
         half_pair=half_pairs,

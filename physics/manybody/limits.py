@@ -6,6 +6,8 @@ from typing import Any, cast
 import numpy as np
 
 from physics.analysis.step_limits import check_step
+from physics.analysis.time_control_limits import check_time_control
+from physics.manybody.kinds import Kinds
 from physics.model.build import build
 from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
@@ -60,6 +62,21 @@ def check_crowd(
                 _check([own, *([around] * _NEIGHBOURS)], statics, scene, fidelity)
     for fields, mechanism in mechanisms if scene.fields or scene.drives else ():
         _check_mechanism(scene, fidelity, fields, mechanism)
+
+
+def check_impacts(scene: Scene, fidelity: Fidelity, kinds: Kinds) -> None:
+    """Raises an error if times of impact can't be found, see `check_time_control`."""
+    names = np.empty((len(kinds.model.half_pair), 2), dtype=object)
+    for i, j in np.argwhere(kinds.pair >= 0):
+        row = kinds.pair_kind[kinds.pair[i, j]]
+        first, last = row["first_half_pair"], row["first_half_pair"] + row["half_pair_count"]
+        # of two solids of one kind the first and the last
+        pair = int(np.argmax(kinds.of_solid == i)), int(np.flatnonzero(kinds.of_solid == j)[-1])
+        if i <= j:
+            for side, solid in enumerate(("owner", "surface")):
+                of_side = kinds.model.half_pair[solid][first:last]
+                names[first:last, side] = [scene.solid_names[pair[n]] for n in of_side]
+    check_time_control(scene, fidelity, kinds.model.half_pair, names, kinds.features)
 
 
 def _check_mechanism(scene: Scene, fidelity: Fidelity, fields: list[int], part: Scene) -> None:

@@ -14,6 +14,7 @@ from physics.manybody.repack import make_occupancy, make_repack, room_for
 from physics.manybody.sorting import lexicographic_order, make_sort_pairs
 from physics.manybody.tables import (
     DISPLACEMENT,
+    IMPACTS,
     MOST_COLOURS,
     ROTATION_BOUND,
     Crowd,
@@ -94,7 +95,10 @@ class PairLists:
         self._free: Homes = no_homes(len(self._kinds.pair_kind), self._places)
 
     def search(self, crowd: Crowd) -> Crowd:
-        """Finds the near pairs of the present poses; those that were near keep their contacts."""
+        """Finds the near pairs of the present poses; those that were near keep their contacts.
+
+        They also keep their homes on the way through a substep, see impact_paths.py.
+        """
         moved = np.abs(crowd.frame[:, DISPLACEMENT : DISPLACEMENT + 3]).sum(axis=1)
         moved += crowd.frame[:, ROTATION_BOUND]
         margin = np.maximum(self._least_margin, _STEPS * moved)
@@ -116,7 +120,8 @@ class PairLists:
             if settled < len(found):
                 self._grow(found[settled:][homes[settled:] < 0])
         self.found, self.homes = found, homes
-        self._repack()
+        if not crowd.path[IMPACTS] > 0.0:
+            self._repack()
         return self.listed(crowd, margin[: self._bodies].reshape(-1, LANES))
 
     def _repack(self) -> None:
@@ -177,7 +182,7 @@ class PairLists:
         )
         batches = max(batches, len(self.pairs.kind))
         check_memory(
-            bytes_with_room(self.pairs, batches, *enough),
+            bytes_with_room(self.pairs, self._kinds.features, batches, *enough),
             "the pairs of bodies that are near each other",
         )
         self.pairs = with_room(self.pairs, self._kinds.features, batches, *enough)

@@ -89,8 +89,13 @@ class CrowdQueries:
 
     def normal_force(self, first: int, second: int) -> Array:
         """[count] N between two solids in the last step; 0 where they aren't near each other."""
+        # without time control, those of a pair that has left each other's reach are out of date
+        timed = self._simulation.kinds.features.finds_impacts
         return np.array([
-            sum(float(row["previous_normal_force"][lane]) for row in rows if row["count"][lane] > 0)
+            sum(
+                float(row["previous_normal_force"][lane])
+                for row in rows if timed or row["count"][lane] > 0
+            )
             for rows, lane in self._of_pair(first, second)
         ])  # fmt: skip
 

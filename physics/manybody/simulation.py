@@ -21,7 +21,7 @@ from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.state import STARTS_ANEW
 from physics.model.tables import DYNAMIC_PER_WORLD, Model
-from physics.model.workspace import CONTACT_ROW, JOINT_WORK, SOLID, START, Workspace
+from physics.model.workspace import CONTACT_ROW, GIVEN, JOINT_WORK, SOLID, START, Workspace
 from physics.rotation import rotation_matrix
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
@@ -42,8 +42,9 @@ _FEWEST_BATCHES = 32
 
 def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
     """Whether a scene is simulated here: many bodies, the same in all worlds."""
-    fixed = fidelity.time_control == "fixed" and fidelity.integrator in ("midpoint", "euler")
-    return len(scene.bodies) >= MANY and fixed and not per_world_parameters
+    steps = fidelity.time_control in ("fixed", "swept")
+    steps = steps and fidelity.integrator in ("midpoint", "euler")
+    return len(scene.bodies) >= MANY and steps and not per_world_parameters
 
 
 class CrowdSimulation(Simulation):
@@ -149,6 +150,8 @@ class CrowdSimulation(Simulation):
             pair_kind=self.kinds.pair_kind,
             stirred=np.zeros(blocks * LANES, np.int64),
             joint_work=np.zeros(groups),
+            kept=aligned_zeros((4 * int(self.kinds.features.finds_impacts), blocks), SOLID),
+            path=np.zeros(3),
         )  # fmt: skip
 
     def _local_partners(self, rows: Array) -> Array:
@@ -196,6 +199,7 @@ class CrowdSimulation(Simulation):
         progress = np.zeros(7, np.int64)
         progress[1], progress[6] = REFRESH if mark else STEP, mark
         crowd.stirred[...] = 0
+        crowd.kept[GIVEN:] = np.zeros(1, SOLID)
         if mark == STARTS_ANEW:
             lists.clear()
             self._place(crowd)
@@ -301,8 +305,10 @@ class CrowdSimulation(Simulation):
     def working_memory(self) -> Workspace:
         """Of one thread, for any kind of pair."""
         kinds = self.kinds
-        # joints have theirs in `Crowd`
-        model = kinds.model._replace(joint_row=kinds.model.joint_row[:0])
+        # joints have theirs in `Crowd`; a batch is of two solids
+        model = kinds.model._replace(
+            dynamic=kinds.model.dynamic[:2], joint_row=kinds.model.joint_row[:0]
+        )
         whole = Workspace.of(model, self.features)
         parts = int(kinds.pair_kind["part_count"].max(initial=0))
         return whole._replace(

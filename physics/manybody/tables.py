@@ -13,7 +13,7 @@ import numpy as np
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.features import Features
 from physics.model.state import candidate_dtype
-from physics.model.workspace import HALF_PAIR_WORK
+from physics.model.workspace import HALF_PAIR_WORK, TIMING
 
 Array = np.ndarray
 
@@ -25,6 +25,7 @@ PAIR_KIND = np.dtype(
         ("slot_count", "i8"),  # of all its half-pairs
         ("first_part", "i8"),  # into Model.compound_part
         ("part_count", "i8"),
+        ("first_dynamic", "i8"),  # into Model.dynamic: a row for each of the two solids
     ],
     align=True,
 )
@@ -51,6 +52,9 @@ BODY_GROUP = np.dtype(
 POSITION, ROTATION, VELOCITY, ANGULAR_VELOCITY = 0, 3, 12, 15
 DISPLACEMENT, ROTATION_BOUND, FRAME_WIDTH = 18, 21, 24
 
+# of Crowd.path: s since the substep began, impacts so far, 1: what touches there has collided
+TIME, IMPACTS, AGAIN = range(3)
+
 # largest number of colours; pairs that find none free are solved one after the other
 MOST_COLOURS = 63
 
@@ -75,6 +79,7 @@ class Pairs(NamedTuple):
         row_count: [batches].
         colliding: [batches, LANES] 1: a pair collides in this substep.
         impact_work: [batches, LANES] J, of its impact impulses.
+        timing: [half-pairs of all batches] of TIMING; time control.
     """
 
     kind: Array
@@ -92,6 +97,7 @@ class Pairs(NamedTuple):
     row_count: Array
     colliding: Array
     impact_work: Array
+    timing: Array
 
 
 class Crowd(NamedTuple):
@@ -123,6 +129,8 @@ class Crowd(NamedTuple):
         pair_kind: [kinds] of PAIR_KIND.
         stirred: [blocks * LANES] when an impact last changed a body's velocity; impulse law.
         joint_work: [groups] J, of the joints' impulses in a collision; impulse law.
+        kept: [4, blocks] of SOLID, see `Workspace.kept`; time control.
+        path: [3] how far the way through a substep has been followed, see TIME.
     """
 
     constants: Array
@@ -146,6 +154,8 @@ class Crowd(NamedTuple):
     pair_kind: Array
     stirred: Array
     joint_work: Array
+    kept: Array
+    path: Array
 
 
 def no_pairs(features: Features) -> Pairs:
@@ -166,19 +176,26 @@ def no_pairs(features: Features) -> Pairs:
         row_count=np.zeros(0, np.int64),
         colliding=np.zeros((0, LANES), np.int64),
         impact_work=np.zeros((0, LANES)),
+        timing=aligned_zeros(0, TIMING),
     )
 
 
-def _sizes(batches: int, slots: int, work: int) -> dict[str, tuple[int, int]]:
+def _sizes(features: Features, slots: int, work: int) -> dict[str, tuple[int, int]]:
     """Axis that grows and its length, of the arrays whose length isn't the number of batches."""
-    return {"candidate": (1, slots), "sample_id": (1, slots), "work": (0, work)}
+    timed = work if features.finds_impacts else 0
+    return {
+        "candidate": (1, slots),
+        "sample_id": (1, slots),
+        "work": (0, work),
+        "timing": (0, timed),
+    }
 
 
-def bytes_with_room(pairs: Pairs, batches: int, slots: int, work: int) -> int:
+def bytes_with_room(pairs: Pairs, features: Features, batches: int, slots: int, work: int) -> int:
     """Bytes of the arrays that `with_room` would make."""
     needed = 0
     for name, array in zip(pairs._fields, pairs, strict=True):
-        axis, length = _sizes(batches, slots, work).get(name, (0, batches))
+        axis, length = _sizes(features, slots, work).get(name, (0, batches))
         others = [n for k, n in enumerate(array.shape) if k != axis]
         needed += array.dtype.itemsize * length * math.prod(others)
     return needed
@@ -186,7 +203,7 @@ def bytes_with_room(pairs: Pairs, batches: int, slots: int, work: int) -> int:
 
 def with_room(pairs: Pairs, features: Features, batches: int, slots: int, work: int) -> Pairs:
     """The same pairs in arrays with room for more, of which the new part is zero."""
-    sizes = _sizes(batches, slots, work)
+    sizes = _sizes(features, slots, work)
 
     def larger(name: str, array: Array) -> Array:
         axis, length = sizes.get(name, (0, batches))

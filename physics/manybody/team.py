@@ -16,8 +16,9 @@ Array = np.ndarray
 # numbers that each thread writes for the others
 SHARED = 16
 # what they are: speed of the fastest approach in m/s, largest restitution, pairs that collide,
-# pairs that a sweep has changed, work in J, bodies that are about to leave their margin
-FASTEST, RESTITUTION, COLLIDING, CHANGED, WORK, FAR = range(6)
+# pairs that a sweep has changed, work in J, bodies that are about to leave their margin, s until
+# solids can touch, pairs that may touch in this substep or do so now
+FASTEST, RESTITUTION, COLLIDING, CHANGED, WORK, FAR, SAFE, MEETING = range(8)
 # consecutive batches that one thread takes
 BATCHES = 4
 
@@ -67,6 +68,17 @@ def total(team, column):
     found = 0.0
     for t in range(team.threads):
         found += team.shared[t, column]
+    wait(team)
+    return found
+
+
+@stage
+def smallest(team, column):
+    """The smallest of what the threads have found; all wait before and after."""
+    wait(team)
+    found = team.shared[0, column]
+    for t in range(1, team.threads):
+        found = min(found, team.shared[t, column])
     wait(team)
     return found
 

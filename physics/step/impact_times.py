@@ -237,15 +237,13 @@ def make_find_impact(features):
 
 
 @cached_by_features
-def make_evaluate(features):
+def make_evaluate_here(features):
     """Stage: the earliest of all timed half-pairs, and the nearest sample that approaches."""
-    place, half_pair_time = make_place(features), make_half_pair_time(features)
+    half_pair_time = make_half_pair_time(features)
 
     @stage
-    def evaluate(model, workspace, i, time, h):
-        """Returns s until one can touch, m, m/s, and whether that sample touches."""
-        place(model, workspace, i, time - 0.5 * h)
-        left = max(h - time, 0.0)
+    def evaluate_here(model, workspace, i, left, h):
+        """Returns s, at most `left`, until one can touch, m, m/s, and whether any touches."""
         earliest, nearest, rate, touches = left, NONE, 0.0, False
         for k in range(model.half_pair.shape[0]):
             if workspace.timing[k].timed[i]:
@@ -258,6 +256,19 @@ def make_evaluate(features):
                     # below zero: its list is replaced, so it contains what touches
                     workspace.half_pair[k].remaining_skin[i] = -1.0
         return earliest, nearest, rate, touches
+
+    return evaluate_here
+
+
+@cached_by_features
+def make_evaluate(features):
+    """The same, at `time` s after the substep has begun."""
+    place, evaluate_here = make_place(features), make_evaluate_here(features)
+
+    @stage
+    def evaluate(model, workspace, i, time, h):
+        place(model, workspace, i, time - 0.5 * h)
+        return evaluate_here(model, workspace, i, max(h - time, 0.0), h)
 
     return evaluate
 

@@ -73,12 +73,15 @@ def make_move(features):
 
 
 @cached_by_features
-def make_place(features):
-    """Stage that updates frames and velocities in lane i, `offset` s after the substep's middle."""
-    angular_velocity, compound = make_angular_velocity(features), features.compound
+def make_place_dynamic(features):
+    """Stage that updates frames and velocities of dynamic bodies in lane i.
+
+    They are those at `offset` s after the substep's middle.
+    """
+    angular_velocity = make_angular_velocity(features)
 
     @stage
-    def place(model, workspace, i, offset):
+    def place_dynamic(model, workspace, i, offset):
         for m in range(model.dynamic.shape[0]):
             solid, constants = workspace.solid[m], model.dynamic[m]
             inverse_mass = at(constants.inverse_mass, i)
@@ -100,6 +103,18 @@ def make_place(features):
                 solid.angular_velocity[0, i] = ox
                 solid.angular_velocity[1, i] = oy
                 solid.angular_velocity[2, i] = oz
+
+    return place_dynamic
+
+
+@cached_by_features
+def make_place(features):
+    """The same, and of the parts of compounds."""
+    place_dynamic, compound = make_place_dynamic(features), features.compound
+
+    @stage
+    def place(model, workspace, i, offset):
+        place_dynamic(model, workspace, i, offset)
         if compound:
             first = model.dynamic.shape[0] + model.static.shape[0]
             for p in range(model.compound_part.shape[0]):
