@@ -154,9 +154,9 @@ def array(field: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """
     try:
         result = np.asarray(value, dtype=float)
-        if result.ndim and result.size and 0 in shape[1:]:  # would broadcast to no values
-            raise ValueError
         if result.shape != shape:
+            if result.ndim and result.size and 0 in shape[1:]:  # would broadcast to no values
+                raise ValueError
             result = np.broadcast_to(result, shape)
     except (TypeError, ValueError):
         got = getattr(value, "shape", None)

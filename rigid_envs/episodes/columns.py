@@ -1,7 +1,7 @@
 """From the users' rows, one per world, to the columns of tasks and back, in one pass each.
 
 Tasks compute with columns, where NumPy's loops run over the worlds; users expect rows. What the
-runner does with every step, it does on the way: clipping.
+runner does with every step, it does on the way: clipping, and the distance of goals.
 """
 
 from functools import cache
@@ -11,6 +11,7 @@ import numpy as np
 
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
+from rigid_envs.tasks.goals import goal_distance
 
 Array = np.ndarray
 
@@ -25,12 +26,17 @@ class Observed(NamedTuple):
         achieved: [count, goal] float32.
         desired: [count, goal] float32.
         outside: [count] bool, whether any component of a world was clipped.
+        goals: [count, 2 goal] float32, achieved and desired side by side, as `rewards.join_goals`
+            gives them; [0, 2 goal] if nobody asks.
+        goal_distance: [count] m, as `goals.distance` gives it, in every bit.
     """
 
     observation: Array
     achieved: Array
     desired: Array
     outside: Array
+    goals: Array
+    goal_distance: Array
 
 
 @cache
@@ -68,11 +74,20 @@ def _make_split() -> Any:
                     for i in range(len(column)):
                         to[i] = column[i]
                         to_desired[i] = goal[i]
+            achieved, desired = table[n:, start:end], goals[:, start:end]
+            for i in range(end - start):
+                rows.goal_distance[start + i] = goal_distance(achieved, desired, i)
+            if rows.goals.shape[0] > 0:
+                size = goals.shape[0]
+                for i in range(end - start):
+                    for c in range(size):
+                        rows.goals[start + i, c] = achieved[c, i]
+                        rows.goals[start + i, size + c] = desired[c, i]
 
     return split
 
 
-def split(table: Array, low: Array, high: Array, goals: Array) -> Observed:
+def split(table: Array, low: Array, high: Array, goals: Array, joins: bool) -> Observed:
     """Clips a table of observations to their bounds, in place, and copies it into rows.
 
     NaN stays NaN.
@@ -82,6 +97,7 @@ def split(table: Array, low: Array, high: Array, goals: Array) -> Observed:
         low: [n + goal] float32.
         high: [n + goal] float32.
         goals: [count, goal] float32, Fortran-contiguous: the desired ones.
+        joins: whether to write `Observed.goals`.
     """
     count, goal = goals.shape
     rows = Observed(
@@ -89,6 +105,8 @@ def split(table: Array, low: Array, high: Array, goals: Array) -> Observed:
         np.empty((count, goal), dtype=np.float32),
         np.empty((count, goal), dtype=np.float32),
         np.empty(count, dtype=bool),
+        np.empty((count if joins else 0, 2 * goal), dtype=np.float32),
+        np.empty(count),
     )
     _make_split()(table, low, high, goals.T, rows)
     return rows

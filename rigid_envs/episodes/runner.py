@@ -17,7 +17,7 @@ from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.goals import distance
-from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, join_goals
+from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS
 
 Array = np.ndarray
 Observation = dict[str, Array]
@@ -92,6 +92,7 @@ class Runner:
         self.terminate_on_success = bool(terminate_on_success)
         reward = self.task.reward
         self.reward = reward.with_time_penalty() if self.terminate_on_success else reward
+        self._has_task_terms = bool(self.reward.task_terms)
 
         self.observe_parameters: bool = instance("observe_parameters", observe_parameters, bool)
         if self.observe_parameters and not self.randomization.bounds:
@@ -225,9 +226,9 @@ class Runner:
             self.task.guide(self.world, now, achieved, desired, guide)
             if not self._observed:
                 check_written(self.task, "guide", self.task.guide_bounds, guide)
-        rows = split(table, self._low, self._high, desired)
-        # by the kernel of `compute_reward`, so both agree in every bit
-        self._goal_distance = distance(achieved, desired)
+        joins = self.reward_type == "dense" and self._has_task_terms
+        rows = split(table, self._low, self._high, desired, joins)
+        self._goal_distance = rows.goal_distance
         # one row per world, as users expect
         observation = {
             "observation": rows.observation,
@@ -245,8 +246,8 @@ class Runner:
             "out_of_bounds": rows.outside,
             **terms,
         }
-        if self.reward_type == "dense" and self.reward.task_terms:
-            info[STEP_GOALS] = join_goals(achieved, desired)
+        if joins:
+            info[STEP_GOALS] = rows.goals
         return observation, info
 
     def check_actions(self, actions: Any) -> Array:
@@ -308,9 +309,11 @@ class Runner:
             terminated = info["is_success"].copy()
         else:
             terminated = np.zeros(self.count, dtype=bool)
-        truncated = info["out_of_bounds"].copy()
-        if self.max_episode_steps is not None:
-            truncated = truncated | (self._elapsed >= self.max_episode_steps)
+        outside = info["out_of_bounds"]
+        if self.max_episode_steps is None:
+            truncated = outside.copy()
+        else:
+            truncated = outside | (self._elapsed >= self.max_episode_steps)
         if reset_mask is not None:
             rewards[reset_mask] = 0.0
             terminated, truncated = terminated & ~reset_mask, truncated & ~reset_mask

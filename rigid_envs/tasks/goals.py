@@ -18,8 +18,8 @@ Array = np.ndarray
 
 
 @stage
-def _goal_distance(a, b, i):
-    """Distance between the goals a[:, i] and b[:, i]."""
+def goal_distance(a, b, i):
+    """Distance in m between the goals a[:, i] and b[:, i]."""
     largest, n = 0.0, a.shape[0]
     for point in range(0, n, 3):
         square = 0.0
@@ -39,7 +39,7 @@ def _make_distances() -> Any:
     def distances(a, b, out):
         _ = sources
         for i in range(out.shape[0]):
-            out[i] = _goal_distance(a, b, i)
+            out[i] = goal_distance(a, b, i)
 
     return distances
 

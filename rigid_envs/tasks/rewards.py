@@ -57,11 +57,16 @@ class Reward:
 
     def dense(self, success: Any, goal_distance: Any, terms: Mapping[str, Array]) -> Any:
         """The dense reward [...]."""
-        known = {"success": success, "distance": -goal_distance, "time": 1.0}
-        reward = np.zeros_like(goal_distance)
+        reward: Any = None
         for name, weight in self.weights.items():
-            reward = reward + weight * (known[name] if name in known else terms[name])
-        return reward
+            if name == "distance":
+                term = -weight * goal_distance
+            elif name == "time":
+                term = np.full_like(goal_distance, weight)
+            else:
+                term = weight * (success if name == "success" else terms[name])
+            reward = term if reward is None else reward + term
+        return np.zeros_like(goal_distance) if reward is None else reward
 
     def compute(self, reward_type: str, achieved: Array, desired: Array, info: Any) -> Any:
         """The reward of pairs of goals, as `compute_reward` of the environments returns it.
