@@ -13,6 +13,7 @@ import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -90,8 +91,12 @@ def sizes() -> Iterator[Table]:
     draw = np.random.default_rng(0)
     radii = RADIUS * np.exp(np.linspace(np.log(1.0), np.log(1.0 / RATIO), SIZES))
     mixed = [Sphere(radii[k]) for k in draw.choice(SIZES, MIXED, p=radii**-1 / np.sum(radii**-1))]
+    cases: list[tuple[str, list[Any], str]]
     cases = [(f"{n:,} spheres, {f}", [Sphere(RADIUS)] * n, f)
              for n in SPHERES for f in FRICTIONS.values()]  # fmt: skip
+    piece = HEAPS["chess"][1]
+    cases += [(f"{n:,} in chess pieces, {f}", [piece] * (n // len(piece.points)), f)
+              for n in SPHERES[1:] for f in FRICTIONS.values()]  # fmt: skip
     cases += [("20,000 equal spheres, viscous", [Sphere(RADIUS)] * MIXED, "viscous")]
     cases += [("20,000 spheres, sizes 1:20, viscous", mixed, "viscous")]
     for label, shapes, friction in cases:
@@ -105,7 +110,8 @@ def sizes() -> Iterator[Table]:
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         rate = run(simulation, steps)
-        rows.append([label, 1e9 / (rate * len(shapes)), peak / len(shapes)])
+        particles = len(simulation.particles[0])
+        rows.append([label, 1e9 / (rate * particles), peak / particles])
     yield Table(
         "granular_sizes", "Time and memory of one world by number of particles",
         ["particles", "ns a particle and step", "peak bytes a particle"], rows,
