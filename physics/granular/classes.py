@@ -40,7 +40,8 @@ class Bodies(NamedTuple):
         weight: [bodies] of each particle, see `Samples.weights`.
         is_ball: [bodies] whether it is a Sphere.
         particles: [bodies] how many each has.
-        points: [n, 4] x y z in the body's frame and radius, in m.
+        local: [n, 4] x y z in the body's frame and radius, in m, of each particle; of those of one
+            body if all are equal.
         equal: whether all have the same shape, mass and material.
     """
 
@@ -49,8 +50,27 @@ class Bodies(NamedTuple):
     weight: Array
     is_ball: Array
     particles: Array
-    points: Array
+    local: Array
     equal: bool
+
+    @property
+    def points(self) -> Array:
+        """[n, 4] like `local`, of every particle."""
+        return np.tile(self.local, (len(self.particles), 1)) if self.equal else self.local
+
+    @property
+    def radii(self) -> Array:
+        """[n] m, of every particle."""
+        radii = self.local[:, 3]
+        return np.tile(radii, len(self.particles)) if self.equal else radii
+
+    @property
+    def reach(self) -> Array:
+        """[bodies] m, from the centre to the farthest point of the surface."""
+        outermost = np.sqrt(np.sum(self.local[:, :3] ** 2, axis=1)) + self.local[:, 3]
+        if self.equal:
+            return np.full(len(self.particles), outermost.max())
+        return np.maximum.reduceat(outermost, np.cumsum(self.particles) - self.particles)
 
 
 def _distinct(scene: Scene) -> tuple[list[Body], Array]:
@@ -115,14 +135,16 @@ def bodies_of(scene: Scene, fidelity: Fidelity) -> tuple[Bodies, list[Body]]:
     points = [_points(shape) for shape in shapes]  # type: ignore[arg-type]
     counts = np.array([len(one) for one in points])
     starts = np.concatenate([[0], np.cumsum(counts)])
-    of_all = np.repeat(starts[which], counts[which]) + _count_up(counts[which])
+    local = np.concatenate(points)
+    if len(examples) > 1:
+        local = local[np.repeat(starts[which], counts[which]) + _count_up(counts[which])]
     return Bodies(
         dynamic=build_dynamic(scene, fidelity, examples)[which],
         class_of=class_of[which],
         weight=np.array(weights)[which],
         is_ball=np.array([isinstance(shape, Sphere) for shape in shapes])[which],
         particles=counts[which],
-        points=np.concatenate(points)[of_all],
+        local=local,
         equal=len(examples) == 1,
     ), first
 

@@ -52,7 +52,7 @@ def allocate(
     bodies: Bodies, constants: Constants, features: HeapFeatures, in_particle_geometry: bool
 ) -> Heap:
     """A heap in which nothing is listed yet, and nothing is anywhere."""
-    count, n = len(bodies.particles), len(bodies.points)
+    count, n, radii = len(bodies.particles), int(bodies.particles.sum()), bodies.radii
     groups = -(-count // LANES)
     lists, places = 1 + features.history, groups * LANES
     room = int(_FIRST_PAIRS * n / SLABS) + LANES
@@ -62,7 +62,7 @@ def allocate(
     first[1 : count + 1] = np.cumsum(bodies.particles)
     first[count + 1 :] = n
     particle = aligned_zeros((n, 4), np.dtype(float))
-    particle[:, 3] = bodies.points[:, 3]
+    particle[:, 3] = radii
     motion = aligned_zeros((places, MOTION), np.dtype(float))
     motion[:count, INVERSE_MASS] = bodies.dynamic["inverse_mass"]
     motion[:count, CLASS] = bodies.class_of
@@ -74,8 +74,8 @@ def allocate(
         reach=_reach(bodies, index, places),
         first=first,
         body_of=np.repeat(index.astype(np.int32), bodies.particles),
-        level_of=_levels(bodies.points[:, 3])[0].astype(np.uint8),
-        local=bodies.points[: bodies.particles[0] if bodies.equal else n].copy(),
+        level_of=_levels(radii)[0].astype(np.uint8),
+        local=bodies.local.copy(),
         body=aligned_zeros(groups, BODY),
         particle=particle,
         motion=motion,
@@ -123,11 +123,8 @@ def _dynamic(bodies: Bodies, order: Array, groups: int) -> Array:
 
 def _reach(bodies: Bodies, order: Array, places: int) -> Array:
     """[places] m, from the centre to the farthest point of the surface."""
-    outermost = np.sqrt(np.sum(bodies.points[:, :3] ** 2, axis=1)) + bodies.points[:, 3]
     reach = np.zeros(places)
-    reach[: len(order)] = np.maximum.reduceat(
-        outermost, np.cumsum(bodies.particles) - bodies.particles
-    )[order]
+    reach[: len(order)] = bodies.reach[order]
     return reach
 
 
@@ -207,9 +204,10 @@ def cover(heap: Heap, radii: Array) -> None:
 def sort(heap: Heap, bodies: Bodies) -> Heap:
     """The same heap with its bodies sorted by where they are, so neighbours are near in memory.
 
-    Everything moves with them, history included. The list must be made again afterwards.
+    Everything moves with them, history included. The list must be made again afterwards. The large
+    arrays are sorted in place, so a heap that is interrupted here must be allocated anew.
     """
-    radii = bodies.points[:, 3]
+    radii = bodies.radii
     cover(heap, radii)
     count = len(heap.order)
     before = heap.order
@@ -232,22 +230,19 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
 
     wall = heap.wall.copy()
     wall[..., 0] = moved(np.minimum(wall[..., 0], len(where) - 1))
-    groups = len(heap.body)
-    motion = aligned_zeros(heap.motion.shape, heap.motion.dtype)
-    motion[:count] = heap.motion[places]
+    heap.motion[:count] = heap.motion[places]
+    heap.particle[:] = heap.particle[particles]
+    _sort_rows(heap.body, places)
     heap.counts[REBUILDS] = heap.counts[VALID] = 0
     return heap._replace(
         order=order,
         rank=heap.rank[places],
-        dynamic=_dynamic(bodies, order, groups),
+        dynamic=_dynamic(bodies, order, len(heap.body)),
         reach=_reach(bodies, order, len(heap.reach)),
         first=first,
         body_of=np.repeat(np.arange(count, dtype=np.int32), counts),
         level_of=heap.level_of[particles],
         local=heap.local if bodies.equal else heap.local[particles],
-        body=_sorted_rows(heap.body, places),
-        particle=_sorted_particles(heap, particles),
-        motion=motion,
         pair=moved(heap.pair),
         pair_range=_of_particles(heap.pair_range, particles),
         wall=wall,
@@ -265,21 +260,13 @@ def _of_particles(ranges: Array, particles: Array) -> Array:
     return np.take(ranges, particles, axis=1) if ranges.size else ranges
 
 
-def _sorted_particles(heap: Heap, particles: Array) -> Array:
-    rows = aligned_zeros(heap.particle.shape, heap.particle.dtype)
-    rows[:] = heap.particle[particles]
-    return rows
-
-
-def _sorted_rows(body: Array, places: Array) -> Array:
-    """Rows of BODY whose lanes are sorted; lanes without a body stay."""
-    rows = aligned_zeros(body.shape, body.dtype)
+def _sort_rows(body: Array, places: Array) -> None:
+    """Sorts the lanes of rows of BODY; lanes without a body stay."""
     every = np.concatenate([places, np.arange(len(places), len(body) * LANES)])
     group, lane = np.divmod(every, LANES)
     for name in BODY.names or ():
         values: Any = body[name][group, :, lane]
-        rows[name] = np.moveaxis(values.reshape(len(body), LANES, -1), 1, 2)
-    return rows
+        body[name] = np.moveaxis(values.reshape(len(body), LANES, -1), 1, 2)
 
 
 def forget(heap: Heap) -> None:

@@ -81,19 +81,17 @@ class GranularSimulation(Simulation):
         self.scene, self.fidelity, self.count, self.threads = scene, fidelity, count, threads
         self.bodies = len(scene.bodies)
         self._bodies, classes = bodies_of(scene, fidelity)
-        radii = self._bodies.points[:, 3]
+        radii = self._bodies.radii
         self._constants = constants_of(scene, fidelity, classes, radii)
         self.heap_features = self._heap_features()
         self.base, self.features = self._model_and_features()
         self.model = self.base
         self.parameters = Parameters.of(scene)
         self.everyone = np.ones(count, dtype=bool)
-        particles = fidelity.geometry == "particle"
-        arguments = self._bodies, self._constants, self.heap_features, particles
-        self.heaps: list[Heap] = [allocate(*arguments)]
+        self.heaps: list[Heap] = [self._new_heap()]
         own = self.bodies * DYNAMIC_STATE.itemsize
         check_memory(count * (own + self.heaps[0].nbytes), f"{count} heaps of {self.bodies} bodies")
-        self.heaps += [allocate(*arguments) for _ in range(count - 1)]
+        self.heaps += [self._new_heap() for _ in range(count - 1)]
         self.state: State = allocate_state(self.base, self.features, count)
         self._scratch: Scratch = scratch_for(self.heaps[0], radii, threads)
         self._advance, self._readout = make_advance(self.heap_features), make_readout(self.features)
@@ -102,6 +100,10 @@ class GranularSimulation(Simulation):
         self._table_valid = False
         self.last_substep, self._last_worlds = math.nan, self.everyone
         self.reset(self.everyone)
+
+    def _new_heap(self) -> Heap:
+        particles = self.fidelity.geometry == "particle"
+        return allocate(self._bodies, self._constants, self.heap_features, particles)
 
     def _heap_features(self) -> HeapFeatures:
         constants, moments = self._constants, self._bodies.dynamic["inertia"]
@@ -128,10 +130,10 @@ class GranularSimulation(Simulation):
             friction=own.friction, viscous=own.viscous, rotation=own.rotation
         )
 
-    def _initial_rows(self) -> Array:
-        """The scene's state as rows [bodies] of DYNAMIC_STATE."""
+    def _write_initial(self, rows: Array) -> None:
+        """Writes the scene's state to rows [bodies] of DYNAMIC_STATE."""
         bodies, constants = self.scene.bodies, self._bodies.dynamic
-        rows = np.zeros(self.bodies, dtype=DYNAMIC_STATE)
+        rows[...] = np.zeros(1, dtype=DYNAMIC_STATE)
         rows["position"] = rows["reference"] = [body.position for body in bodies]
         rows["orientation"] = [body.orientation for body in bodies]
         velocity = np.array([body.linear_velocity for body in bodies])
@@ -140,11 +142,14 @@ class GranularSimulation(Simulation):
         rows["angular_momentum"] = angular_momentum_of(
             constants["inertia"], rows["orientation"], spin
         )
-        return rows
 
     def reset(self, worlds: Array) -> None:
         """Puts the worlds of a mask into the scene's state, at time zero."""
-        self.state.dynamic[worlds] = self._initial_rows()
+        chosen, rows = np.flatnonzero(worlds), self.state.dynamic
+        for w in chosen[:1]:
+            self._write_initial(rows[w])
+        for w in chosen[1:]:
+            rows[w] = rows[chosen[0]]
         self.state.world["time"][worlds] = 0.0
         self.forget(worlds)
 
@@ -193,6 +198,7 @@ class GranularSimulation(Simulation):
                 try:
                     bad = self._run_heap(int(w), h, steps, refresh)
                 except BaseException:  # interrupted: the world is as before, contacts begin afresh
+                    self.heaps[w] = self._new_heap()
                     self.forget(np.arange(self.count) == w)
                     raise
                 status["time"][w] += int(self._scratch.result[STEPS]) * h
