@@ -91,7 +91,8 @@ def make_merge(features: Features):
                     clear(pairs.candidate[0, slot + c], i)
                 clear_lane(row, i, FOREVER)
                 if timed:
-                    pairs.timing[pairs.first_work[b] + k].impulse[i] = 0.0
+                    timing = pairs.timing[pairs.first_work[b] + k]
+                    timing.timed[i], timing.impulse[i] = 0, 0.0
                 slots = 0
                 for lane in range(LANES):
                     slots = max(slots, row.count[lane])

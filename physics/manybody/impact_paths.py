@@ -35,6 +35,7 @@ from physics.manybody.tables import (
 from physics.manybody.team import FAR, MEETING, SAFE, share, smallest, takes_batch, total, wait
 from physics.model.features import cached_by_features
 from physics.model.workspace import BEGINNING
+from physics.motion.drives import make_finger_coupling
 from physics.motion.kinematics import make_kinematics
 from physics.step.event_steps import (
     MOST_IMPACTS,
@@ -97,7 +98,6 @@ def make_choose_pairs(features):
                 for k in range(mine.half_pair.shape[0]):
                     mine.timing[k].timed[i] = 0
                     mine.timing[k].impulse[i] = 0.0
-                    mine.half_pair[k].previous_normal_force[i] = 0.0
             if pairs.first[b, i] >= 0:
                 gather_solid(crowd, pairs.first[b, i], workspace.solid[0], i)
                 gather_solid(crowd, pairs.second[b, i], workspace.solid[1], i)
@@ -106,6 +106,15 @@ def make_choose_pairs(features):
         return count
 
     return choose_pairs
+
+
+@stage
+def clear_forces(crowd, pairs, b):
+    """Clears the mean normal forces of a batch: those of a substep are added up on the way."""
+    first = pairs.first_work[b]
+    for k in range(first, first + crowd.pair_kind[pairs.kind[b]].half_pair_count):
+        for i in range(LANES):
+            pairs.work[k].previous_normal_force[i] = 0.0
 
 
 @cached_by_features
@@ -141,19 +150,19 @@ def make_time_pairs(features):
 
 @cached_by_features
 def make_expect_motion(features):
-    """Sequence that predicts how far the bodies of a group move in `left` s.
+    """Sequence that predicts how far the bodies of a group move from `time` s to the end.
 
     It writes that to their frames, where a search looks for it, and returns how many would leave
-    their margin.
+    their margin. A body that tumbles can turn faster later on: twice as fast is allowed for.
     """
     place = make_place_dynamic(features)
 
     @sequence
-    def expect_motion(model, workspace, crowd, g, left):
+    def expect_motion(model, workspace, crowd, g, time, h):
         own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
-        far = 0
+        far, left = 0, h - time
         for i in range(LANES):
-            place(own, mine, i, 0.0)
+            place(own, mine, i, 0.5 * time)  # in the middle of the rest
         for m in blocks_of(crowd, g):
             write_frames(crowd, m)
             v, omega, constants = (
@@ -167,7 +176,8 @@ def make_expect_motion(features):
                     frame[DISPLACEMENT + c] = left * v[c, i]
                     step += left * abs(v[c, i])
                 spin = abs(omega[0, i]) + abs(omega[1, i]) + abs(omega[2, i])
-                frame[ROTATION_BOUND] = left * spin * at(constants.core_reach, i)
+                turns = min(2.0 * left * spin, 2.0)  # no point moves further than across the body
+                frame[ROTATION_BOUND] = turns * at(constants.core_reach, i)
                 step += frame[ROTATION_BOUND]
                 stays = crowd.motion[m, i] + step <= crowd.margin[m, i]  # False of NaN
                 far += 0 if stays or crowd.body[m * LANES + i] < 0 else 1
@@ -202,9 +212,9 @@ def make_follow(features):
     expect_motion = make_expect_motion(features)
 
     @sequence
-    def begin(model, workspace, crowd, g, h):
+    def begin(model, workspace, crowd, g, before, h):
         own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
-        kick(own, mine, 0.5 * h)
+        kick(own, mine, before)
         forget_given(own, mine, h)
         for i in range(LANES):
             clear_given(own, mine, i)
@@ -245,8 +255,8 @@ def make_follow(features):
         return h, False
 
     @sequence
-    def follow(model, workspace, crowd, pairs, half, h, begins, team):
-        """`half`: s of the kick before; `begins`: a substep."""
+    def follow(model, workspace, crowd, pairs, before, h, begins, team):
+        """`begins`: a substep, with a kick of `before` s."""
         first, last = share(0, crowd.group.shape[0], team)
         time, impacts, again = crowd.path[TIME], crowd.path[IMPACTS], crowd.path[AGAIN] != 0.0
         wait(team)
@@ -255,8 +265,8 @@ def make_follow(features):
         far, mine = 0, team.shared[team.thread]
         for g in range(first, last):
             if begins:
-                begin(model, workspace, crowd, g, h)
-            far += expect_motion(model, workspace, crowd, g, h - time)
+                begin(model, workspace, crowd, g, before, h)
+            far += expect_motion(model, workspace, crowd, g, time, h)
         mine[FAR] = far
         if team.thread == 0:
             crowd.path[TIME], crowd.path[IMPACTS] = time, impacts
@@ -266,18 +276,18 @@ def make_follow(features):
         mine[MEETING] = 0.0
         for n in range(crowd.order.shape[0]):
             if takes_batch(n, team):
-                mine[MEETING] += choose_pairs(
-                    model, workspace, crowd, pairs, crowd.order[n], h, impacts == 0.0
-                )
-        may_meet = total(team, MEETING) > 0.0
+                b = crowd.order[n]
+                if impacts == 0.0:
+                    clear_forces(crowd, pairs, b)
+                mine[MEETING] += choose_pairs(model, workspace, crowd, pairs, b, h, impacts == 0.0)
+        on_the_way = total(team, MEETING) > 0.0 or impacts > 0.0
         for g in range(first, last):
             own, near = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
             for i in range(LANES):
-                if impacts == 0.0:
+                if on_the_way and impacts == 0.0:
                     keep_pose(own, near, BEGINNING, i)
                 rest_since_search(own, near, i)
         meets = False
-        on_the_way = impacts > 0.0 or may_meet
         if on_the_way and impacts < max(MOST_IMPACTS, crowd.place.shape[0]):
             time, meets = find(model, workspace, crowd, pairs, h, time, again, first, last, team)
         for g in range(first, last):
@@ -288,8 +298,9 @@ def make_follow(features):
                     place(own, near, i, 0.0)
             elif impacts == 0.0:  # a way without impacts is that of fixed steps
                 for i in range(LANES):
-                    restore_pose(own, near, BEGINNING, i)
-                    rest_since_search(own, near, i)
+                    if on_the_way:
+                        restore_pose(own, near, BEGINNING, i)
+                        rest_since_search(own, near, i)
                 drift(own, near, h)
             if not meets:
                 kinematics(own, near)
@@ -328,6 +339,7 @@ def make_leave_impact(features):
 
     It notes their impulses, and first contacts.
     """
+    couple_fingers = make_finger_coupling(features)
 
     @sequence
     def leave_impact(all_model, workspace, rows, crowd, pairs, h, began, collided, team):
@@ -350,6 +362,7 @@ def make_leave_impact(features):
                             first_touch[i] = began + time
         for g in range(first, last):
             own, near = group_model(all_model, crowd, g), group_workspace(workspace, crowd, g)
+            couple_fingers(own, near, h)
             for i in range(LANES):
                 shift_momenta(own, near, i, 0.5 * h - time)
         wait(team)

@@ -78,13 +78,25 @@ def scatter_speeds(crowd, pairs, b, workspace):
                     crowd.frame[p, ANGULAR_VELOCITY + c] = omega[c, i]
 
 
+@stage
+def mark_phase(clock, meets):
+    """Tells the stages of a lane group whether all its pairs are at an impact."""
+    for i in range(LANES):
+        clock.phase[i] = MEETS if meets else FREE
+
+
 @cached_by_features
 def make_list_contacts(features):
-    """Sequence that renews the lists of a batch, and counts the contact rows that it needs."""
-    find_candidates = make_find_candidates(features)
+    """Sequence that renews the lists of a batch, and counts the contact rows that it needs.
+
+    `meets`: at an impact within a substep.
+    """
+    find_candidates, timed = make_find_candidates(features), features.finds_impacts
 
     @sequence
-    def list_contacts(all_model, state, workspace, crowd, pairs, b, starts_collision_step):
+    def list_contacts(all_model, state, workspace, crowd, pairs, b, starts_collision_step, meets):
+        if timed:  # what touches is kept where a manifold is chosen
+            mark_phase(workspace.clock[0], meets)
         kind = crowd.pair_kind[pairs.kind[b]]
         model = model_of(all_model, kind)
         mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
@@ -124,8 +136,7 @@ def make_prepare_batch(features):
             if mine.half_pair[k].slots > 0:
                 contact_rows(model, own, mine, 0, k, workspace.lane[0].updates_memory, h)
         if timed:
-            for i in range(LANES):
-                workspace.clock[0].phase[i] = MEETS if meets else FREE
+            mark_phase(workspace.clock[0], meets)
             expect_impacts(model, mine, not meets)
 
     return prepare_batch

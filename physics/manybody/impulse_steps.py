@@ -23,6 +23,7 @@ from physics.manybody.couplings import make_begin_joints, make_end_joints, make_
 from physics.manybody.impact_paths import (
     count_batch_impulses,
     make_advance_bodies,
+    make_choose_pairs,
     make_leave_impact,
 )
 from physics.manybody.impact_steps import make_collide, make_find
@@ -63,6 +64,7 @@ def make_impulse_steps(features: Features):
     sources = SOURCES
     advance_bodies, place_group = make_advance_bodies(features), make_place_group(features)
     timed, leave_impact = features.finds_impacts, make_leave_impact(features)
+    choose_pairs = make_choose_pairs(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     list_contacts, prepare_batch = make_list_contacts(features), make_prepare_batch(features)
     find, collide = make_find(features), make_collide(features)
@@ -103,6 +105,9 @@ def make_impulse_steps(features: Features):
                 for g in range(first, last):
                     place_group(model, workspace, crowd, g)
                 wait(team)
+                for n in range(batches):
+                    if timed and takes_batch(n, team):
+                        choose_pairs(model, workspace, crowd, pairs, crowd.order[n], h, True)
             lagging = 0.0 if refresh or meets else lag * h
             span, drifted = (before * h, 0.0) if refresh else (h, h)
             elapsed = done * h + drifted
@@ -111,7 +116,8 @@ def make_impulse_steps(features: Features):
             if phase != ROWS:
                 for n in range(batches):
                     if takes_batch(n, team):
-                        list_contacts(model, state, workspace, crowd, pairs, crowd.order[n], starts)
+                        b = crowd.order[n]
+                        list_contacts(model, state, workspace, crowd, pairs, b, starts, meets)
                 for g in range(first, last):
                     if not meets:
                         known_forces(model, workspace, crowd, g, drifted)

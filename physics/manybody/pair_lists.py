@@ -97,7 +97,7 @@ class PairLists:
     def search(self, crowd: Crowd) -> Crowd:
         """Finds the near pairs of the present poses; those that were near keep their contacts.
 
-        They also keep their homes on the way through a substep, see impact_paths.py.
+        On the way through a substep no home is moved, see impact_paths.py.
         """
         moved = np.abs(crowd.frame[:, DISPLACEMENT : DISPLACEMENT + 3]).sum(axis=1)
         moved += crowd.frame[:, ROTATION_BOUND]

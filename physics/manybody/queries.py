@@ -88,7 +88,10 @@ class CrowdQueries:
         return np.zeros((0, 3)), 0.0
 
     def normal_force(self, first: int, second: int) -> Array:
-        """[count] N between two solids in the last step; 0 where they aren't near each other."""
+        """[count] N between two solids in the last step; 0 where they aren't near each other.
+
+        With time control impacts within the step count, unless the two have left each other since.
+        """
         # without time control, those of a pair that has left each other's reach are out of date
         timed = self._simulation.kinds.features.finds_impacts
         return np.array([

@@ -13,6 +13,7 @@ from physics import (
     Body,
     Box,
     Fidelity,
+    Gripper,
     Ground,
     Material,
     Scene,
@@ -22,6 +23,7 @@ from physics import (
     World,
 )
 from physics.manybody import simulation as many
+from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import wall
 
 STEP, SPEED, RADIUS = 2e-3, 300.0, 0.0025
@@ -30,6 +32,9 @@ TOLERANCE = Fidelity().impact_tolerance
 FIXED = Fidelity(law="impulse", contact_resolution=1.8, spacing=1.0)
 SWEPT = replace(FIXED, time_control="swept")
 BULLETS, FAR = 40, 50.0
+GRIPPER = Gripper(
+    Box((0.005, 0.005, 0.015)), 0.2, 200.0, 50.0, (2.0, 0.0, FAR), 0.07, frequency=60.0
+)
 
 
 @pytest.fixture(autouse=True)
@@ -52,6 +57,7 @@ def made(scene, fidelity=SWEPT, threads=1):
         scene,
         bodies=(*scene.bodies, *others),
         statics=(*scene.statics, slab, *ground),
+        drives=[GRIPPER],
     )
     return World(whole, fidelity, threads=threads)
 
@@ -66,7 +72,10 @@ def bullets(restitution):
         for n, x in enumerate(start)
     ]  # fmt: skip
     plate = Box((PLATE, 1.0, 0.1))
-    plates = [Static(plate, position=(x, 0.4, 0.0), material=material) for x in (0.0, 1.0)]
+    plates = [
+        Static(plate, position=(x, 0.4, 0.0), material=material, name=f"plate {n}")
+        for n, x in enumerate((0.0, 1.0))
+    ]
     return Scene(bodies, plates, gravity=(0.0, 0.0, 0.0)), start
 
 
@@ -105,7 +114,8 @@ def test_mean_force_and_first_touch_of_impacts_within_a_step():
     world, hits = made(scene), (1.0 - PLATE - RADIUS - start) / SPEED
     world.advance(STEP)
     for n in range(BULLETS):
-        force, touched = world.normal_force(n, BULLETS + 3)[0], world.first_touch(n, BULLETS + 3)[0]
+        force = world.normal_force(n, "plate 1")[0]
+        touched = world.first_touch(n, "plate 1")[0]
         if hits[n] < STEP:
             assert force == pytest.approx(0.004 * 1.5 * SPEED / STEP, rel=1e-6)
             assert touched == pytest.approx(hits[n], abs=3 * TOLERANCE / SPEED)
@@ -218,3 +228,59 @@ def test_what_times_of_impact_can_not_do_is_named():
     ]
     with pytest.raises(ValueError, match="can't divide the steps of joints"):
         World(Scene([*two, *many_bodies[2:]], joints=[joint]), SWEPT)
+
+
+def in_small_world(scene):
+    """The same scene in a world with rows for all pairs."""
+    return Simulation(scene, SWEPT, 1, 1, False)
+
+
+def test_bullets_that_start_within_reach_of_a_list_collide_where_they_touch():
+    """Each begins nearer to a plate than half a step of its way."""
+    material = Material(friction=0.0, restitution=1.0)
+    gaps = 1e-4 * np.arange(1, BULLETS + 1)
+    bodies = [
+        Body(Sphere(0.02), mass=0.004, position=(-0.021 - gap, 0.1 * n, 0.0), material=material,
+             linear_velocity=(50.0, 0.0, 0.0))
+        for n, gap in enumerate(gaps)
+    ]  # fmt: skip
+    plate = Static(Box((PLATE, 10.0, 0.5)), material=material, name="plate")
+    world = made(Scene(bodies, [plate], gravity=(0, 0, 0)))
+    world.advance(STEP)
+    x = -0.021 - 50.0 * (STEP - gaps / 50.0)
+    assert world.position[0, :BULLETS, 0] == pytest.approx(x, abs=3 * TOLERANCE)
+    touched = [world.first_touch(n, "plate")[0] for n in range(BULLETS)]
+    assert touched == pytest.approx(gaps / 50.0, abs=3 * TOLERANCE / 50.0)
+
+
+def test_tilted_cubes_meet_face_to_face_as_in_a_small_world():
+    random, material = np.random.default_rng(5), Material(friction=0.3, restitution=0.4)
+    bodies = [
+        Body(Box((0.01, 0.01, 0.01)), density=1000.0, material=material,
+             position=(side * (0.02 + 0.002 * n), 0.1 * n, 0.004 * side * (n % 3)),
+             orientation=(*(0.02 * random.normal(size=3)), 1.0),
+             linear_velocity=(-side * (60.0 + n), 0.0, 0.0))
+        for n in range(20) for side in (-1, 1)
+    ]  # fmt: skip
+    world = made(Scene(bodies))
+    small = in_small_world(world.scene)
+    for span in (STEP, STEP, 5e-4, 5e-4, STEP):
+        world.advance(span)
+        small.advance(span, small.everyone)
+    apart = world.position[0, :40] - small.state.dynamic["position"][0, :40]
+    assert np.abs(apart).max() < 1e-8
+
+
+def test_the_fingers_of_a_gripper_stay_one_solid_when_a_bullet_hits_one():
+    shot = Body(
+        Sphere(0.004), mass=0.05, position=(1.9, -0.035, FAR + 0.002), linear_velocity=(100.0, 0, 0)
+    )
+    world = made(Scene([shot, *bullets(0.5)[0].bodies[:36]], gravity=(0, 0, 0)))
+    small = in_small_world(world.scene)
+    for _ in range(3):
+        world.advance(STEP)
+        small.advance(STEP, small.everyone)
+    fingers = world.drive_position[0]
+    assert fingers[0, [0, 2]] == pytest.approx(fingers[1, [0, 2]], abs=1e-12)
+    assert world.drive_velocity[0, 0, 0] > 5.0  # it was hit
+    assert fingers == pytest.approx(small.state.dynamic["position"][0, -2:], abs=1e-8)
