@@ -64,7 +64,7 @@ def heaps(python: Path | None) -> Iterator[Table]:
             for phase, (first, steps) in PHASES.items():
                 run(simulation, first - done)
                 start = simulation.state.dynamic.copy()
-                peer = None
+                peer, layer = None, lammps.middle(simulation)
                 if python:
                     peer = lammps.best_run(python, simulation, steps, TRIED)
                 simulation.state.dynamic[:] = start
@@ -77,11 +77,13 @@ def heaps(python: Path | None) -> Iterator[Table]:
                         f"{name} {label} {phase}", rate, peer and peer.rate,
                         rate / peer.rate if peer else None, peer and peer.skin,
                         height, peer and peer.height,
+                        lammps.own_packing(simulation, layer), peer and peer.packing,
                     ]
                 )  # fmt: skip
         yield Table(
             f"granular_{name}", f"Steps per second of {name}, two threads or MPI ranks",
-            ["heap", "ours", "LAMMPS", "ratio", "skin", "height m", "LAMMPS's"], rows,
+            ["heap", "ours", "LAMMPS", "ratio", "skin", "height m", "LAMMPS's",
+             "packing", "LAMMPS's"], rows,
         )  # fmt: skip
 
 

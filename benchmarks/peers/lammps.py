@@ -30,11 +30,34 @@ class Run(NamedTuple):
         rate: steps per second of LAMMPS's own loop, without its start.
         skin: in radii.
         height: m, of the centre of mass at the end.
+        packing: filled fraction of the middle layer at the end, see `packing`.
     """
 
     rate: float
     skin: float
     height: float
+    packing: float
+
+
+def middle(simulation: GranularSimulation) -> tuple[float, float]:
+    """m, from half to three halves of the height of the centre of mass of a heap."""
+    height = float(simulation.state.dynamic["position"][0, :, 2].mean())
+    return 0.5 * height, 1.5 * height
+
+
+def packing(simulation: GranularSimulation, count: float, layer: tuple[float, float]) -> float:
+    """Fraction of a layer of the box that so many particles fill, by their centres."""
+    volume = 4.0 / 3.0 * np.pi * float(simulation.particles[1][0, 3]) ** 3
+    (west, east), (south, north) = _sides(simulation).values()
+    return count * volume / ((east - west) * (north - south) * (layer[1] - layer[0]))
+
+
+def own_packing(simulation: GranularSimulation, layer: tuple[float, float]) -> float:
+    """`packing` of a heap as it is now."""
+    body, local = simulation.particles
+    rows = simulation.state.dynamic[0]
+    z = (rows["position"][body] + rotate(rows["orientation"][body], local[:, :3]))[:, 2]
+    return packing(simulation, float(np.sum((z >= layer[0]) & (z < layer[1]))), layer)
 
 
 def best_run(python: Path, simulation: GranularSimulation, steps: int, tried: int) -> Run:
@@ -66,7 +89,9 @@ def _run(python: Path, simulation: GranularSimulation, steps: int, skin: float) 
     if not found:
         raise RuntimeError(f"LAMMPS failed: {done.stdout[-500:]}{done.stderr[-500:]}{log[-1500:]}")
     rows = [line.split() for line in log.splitlines() if re.match(r"^\s*\d+ +-?[\d.]", line)]
-    return Run(steps / float(found.group(1)), skin, float(rows[-1][1]))
+    height, count = map(float, rows[-1][1:3])
+    filled = packing(simulation, count, middle(simulation))
+    return Run(steps / float(found.group(1)), skin, height, filled)
 
 
 def _data(simulation: GranularSimulation) -> str:
@@ -106,15 +131,21 @@ def _box(simulation: GranularSimulation, points: Array, radius: float) -> tuple[
     return points.min(axis=0) - margin, points.max(axis=0) + 10.0 * margin
 
 
-def _walls(simulation: GranularSimulation) -> list[str]:
-    """Planes of the inner sides of the box, as arguments of fix wall/gran."""
-    sides: dict[str, list[float | None]] = {"x": [None, None], "y": [None, None]}
+def _sides(simulation: GranularSimulation) -> dict[str, list[float]]:
+    """m, where the inner sides of the box are along x and along y."""
+    sides: dict[str, list[float]] = {"x": [0.0, 0.0], "y": [0.0, 0.0]}
     for solid in simulation.scene.statics:
         if isinstance(solid, Static):
             axis = int(np.argmax(np.abs(solid.position[:2])))
             sign = 1.0 if solid.position[axis] > 0.0 else -1.0
             inner = solid.position[axis] - sign * solid.shape.half_extents[axis]  # type: ignore[attr-defined]
-            sides["xy"[axis]][int(sign > 0.0)] = inner
+            sides["xy"[axis]][int(sign > 0.0)] = float(inner)
+    return sides
+
+
+def _walls(simulation: GranularSimulation) -> list[str]:
+    """Planes of the inner sides of the box, as arguments of fix wall/gran."""
+    sides = _sides(simulation)
     return ["zplane 0.0 NULL", *(f"{a}plane {lo!r} {hi!r}" for a, (lo, hi) in sides.items())]
 
 
@@ -140,6 +171,7 @@ def _script(simulation: GranularSimulation, steps: int, skin: float) -> str:
     inner = points[np.argmin(np.sum(points**2, axis=1))]
     reach = float(np.sqrt(np.sum((points - inner) ** 2, axis=1)).max())
     cutoff = max(1.02 * reach, (2.0 + skin) * radius)
+    low, high = middle(simulation)
     walls = [
         f"fix wall{k} all wall/gran {style} {_coefficients(simulation, True)} {wall}"
         for k, wall in enumerate(_walls(simulation))
@@ -157,7 +189,10 @@ def _script(simulation: GranularSimulation, steps: int, skin: float) -> str:
             # of particles of one body no pairs
             "neigh_modify exclude molecule/intra all", "fix bodies all rigid/small molecule",
             *walls,
-            "variable m equal xcm(all,z)", "thermo_style custom step v_m", f"thermo {steps}",
+            "variable m equal xcm(all,z)",
+            f"variable middle atom (z>={low!r})&&(z<{high!r})",
+            "compute middle all reduce sum v_middle",
+            "thermo_style custom step v_m c_middle", f"thermo {steps}",
             "thermo_modify lost ignore flush yes", f"run {steps}", "",
         ]
     )  # fmt: skip

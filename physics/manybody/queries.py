@@ -100,7 +100,7 @@ class CrowdQueries:
                 for row in rows if timed or row["count"][lane] > 0
             )
             for rows, lane in self._of_pair(first, second)
-        ])  # fmt: skip
+        ], dtype=float)  # fmt: skip
 
     def first_touch(self, first: int, second: int) -> Array:
         """[count] s, when two solids first touched since they are near each other; NaN before."""

@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.model.free_memory import check_memory
 from physics.reference.many_bodies import SCENES
 from physics.world import World
 from training.settings.errors import UsageError
 
+# of a body, in the scene and in the engine, at least
+_LEAST_BYTES = 1500
 # s of simulated time between two lines of the counter
 _SHOWN_EVERY = 0.04
 
@@ -22,6 +25,7 @@ class SceneRun(NamedTuple):
         seconds: s of simulated time.
         wall: s that it took, without compiling.
         steps: substeps.
+        kinetic: J, kinetic energy at the end.
         energy: J, kinetic and potential, at the end.
         penetration: m, the deepest at the end.
         interrupted: ended by Ctrl-C.
@@ -30,6 +34,7 @@ class SceneRun(NamedTuple):
     seconds: float
     wall: float
     steps: int
+    kinetic: float
     energy: float
     penetration: float
     interrupted: bool
@@ -43,10 +48,18 @@ def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) 
     """
     if name not in SCENES:
         raise UsageError(f"unknown scene {name!r}: choose one of {', '.join(SCENES)}")
-    scene, fidelity = SCENES[name](bodies, seed)
-    world = World(scene, fidelity, threads=threads)
+    try:
+        check_memory(bodies * _LEAST_BYTES, f"the {bodies} bodies of a scene")
+        scene, fidelity = SCENES[name](bodies, seed)
+        world = World(scene, fidelity, threads=threads)
+    except MemoryError as error:
+        raise UsageError(str(error)) from None
     count = len(scene.bodies)
-    print(f"{name}: {count} bodies, law {fidelity.law}, substep {fidelity.substep * 1e3:.3g} ms")
+    asked = f" of the {bodies} asked for" if count != bodies else ""
+    print(
+        f"{name}: {count} {'body' if count == 1 else 'bodies'}{asked}, law {fidelity.law}, "
+        f"substep {fidelity.substep * 1e3:.3g} ms"
+    )
     substeps = max(1, round(_SHOWN_EVERY / fidelity.substep))
     frame, steps, wall, interrupted = substeps * fidelity.substep, 0, 0.0, False
     try:
@@ -61,10 +74,12 @@ def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) 
             _show(world, steps, wall, seconds)
     except KeyboardInterrupt:
         interrupted = True
-    energy = float(world.kinetic_energy()[0] + world.potential_energy()[0])
+    kinetic = float(world.kinetic_energy()[0])
+    energy = kinetic + float(world.potential_energy()[0])
     made = SceneRun(
-        float(world.time[0]), wall, steps, energy, float(world.penetration()[0]), interrupted
-    )
+        float(world.time[0]), wall, steps, kinetic, energy, float(world.penetration()[0]),
+        interrupted,
+    )  # fmt: skip
     _summarise(made, count)
     return made
 
@@ -91,6 +106,7 @@ def _summarise(made: SceneRun, bodies: int) -> None:
             f"{made.seconds / made.wall:.3f} simulated seconds a second"
         )
     print(
-        f"{made.seconds:.3f} s simulated in {made.steps} steps; energy {made.energy:.6g} J, "
-        f"deepest penetration {1e3 * made.penetration:.3g} mm"
+        f"{'interrupted: ' if made.interrupted else ''}{made.seconds:.3f} s simulated in "
+        f"{made.steps} {'step' if made.steps == 1 else 'steps'}; energy {made.energy:.6g} J, "
+        f"kinetic {made.kinetic:.3g} J; deepest penetration {1e3 * made.penetration:.3g} mm"
     )

@@ -16,7 +16,8 @@ def test_a_scene_prints_its_speed_energy_and_penetration(capsys):
     assert "heap: 40 bodies, law spring, substep 2 ms" in shown
     assert re.search(r"\d+ steps/s, .* simulated seconds a second", shown)
     assert re.search(
-        r"0\.100 s simulated in 50 steps; energy .* J, deepest penetration .* mm", shown
+        r"0\.100 s simulated in 50 steps; energy .* J, kinetic .* J; deepest penetration .* mm",
+        shown,
     )
 
 
@@ -40,6 +41,7 @@ def test_ctrl_c_ends_a_scene_with_what_was_made(capsys, monkeypatch):
     ("arguments", "message"),
     [
         (["cards"], r"unknown scene 'cards': choose one of chess, tori, pyramid"),
+        (["heap", "--bodies", "100000000"], r"100000000 bodies of a scene need 150 GB"),
         (["heap", "--bodies", "0"], r"'0' should be an integer of at least 1"),
         (["heap", "--seconds", "-1"], r"'-1' should be a finite number above 0"),
         (["heap", "--seconds", "nan"], r"'nan' should be a finite number above 0"),
