@@ -65,8 +65,8 @@ class Reward:
                 term = np.full_like(goal_distance, weight)
             else:
                 term = weight * (success if name == "success" else terms[name])
-            # sums are of doubles, whatever a term is
-            reward = np.add(0.0 if reward is None else reward, term, dtype=np.float64)
+            term = np.asarray(term, dtype=np.float64)  # sums are of doubles, whatever a term is
+            reward = term if reward is None else reward + term
         return np.zeros_like(goal_distance) if reward is None else reward
 
     def compute(self, reward_type: str, achieved: Array, desired: Array, info: Any) -> Any:
