@@ -205,7 +205,7 @@ def sort(heap: Heap, bodies: Bodies) -> Heap:
     """The same heap with its bodies sorted by where they are, so neighbours are near in memory.
 
     Everything moves with them, history included. The list must be made again afterwards. The large
-    arrays are sorted in place, so a heap that is interrupted here must be allocated anew.
+    arrays are sorted in place, so a heap that is interrupted here must be allocated again.
     """
     radii = bodies.radii
     cover(heap, radii)

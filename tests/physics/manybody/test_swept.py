@@ -43,7 +43,7 @@ def _threads_for_few_pairs(monkeypatch):
 
 
 def made(scene, fidelity=SWEPT, threads=1):
-    """A world with the scene, and with solids that touch nothing of it."""
+    """A world with the scene, and with solids that touch none of its own."""
     material, ground = Material(friction=0.5, restitution=0.0), []
     if not any(isinstance(static, Ground) for static in scene.statics):
         ground = [Ground(material, -FAR)]
