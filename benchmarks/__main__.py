@@ -1,6 +1,11 @@
-"""Runs all benchmarks, or those named: python -m benchmarks [--save] [name ...]."""
+"""Runs all benchmarks, or those named: python -m benchmarks [--save] [name ...].
+
+python -m benchmarks trade [trial ...] measures the trade of speed for accuracy, which takes an
+hour.
+"""
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -15,13 +20,12 @@ from benchmarks.measure import (
     speed,
     startup,
     time_control,
-    tradeoff,
-    work_precision,
     worlds,
 )
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.results_file import RESULTS, save
 from benchmarks.report.tables import Table, plain
+from benchmarks.trade import measure as trade
 
 MODULES = {
     "speed": speed,
@@ -32,9 +36,7 @@ MODULES = {
     "rendering": rendering,
     "accuracy": accuracy,
     "features": features,
-    "tradeoff": tradeoff,
     "time_control": time_control,
-    "work_precision": work_precision,
 }
 
 
@@ -74,4 +76,7 @@ def run() -> None:
 
 
 if __name__ == "__main__":
-    run()
+    if sys.argv[1:2] == ["trade"]:
+        trade.main(sys.argv[2:])
+    else:
+        run()

@@ -10,7 +10,7 @@ Some literals need no entry:
 - subscripts, and arguments of `range`;
 - the integers 3, 4, 6 and 9, likewise: components of a vector, a quaternion, a symmetric tensor, a
   matrix;
-- physics/reference/: scenes and measures, which no law reads.
+- physics/reference/ and physics/tuning/: scenes and measures, which no law reads.
 """
 
 import argparse
@@ -88,7 +88,7 @@ def collect() -> dict[str, Counter[float]]:
     """How often each value stands in each place, `path:name`, of the engine."""
     found: dict[str, Counter[float]] = defaultdict(Counter)
     for path in sorted((ROOT / "physics").rglob("*.py")):
-        if "reference" not in path.parts:
+        if not {"reference", "tuning"} & set(path.parts):
             name = path.relative_to(ROOT / "physics").as_posix()
             for place, value in literals(path.read_text()):
                 found[f"{name}:{place}"][value] += 1

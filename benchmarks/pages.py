@@ -13,8 +13,11 @@ from benchmarks.report.provenance import ROOT, describe
 from benchmarks.report.results_file import RESULTS, Saved, load
 from benchmarks.report.summary import summary
 from benchmarks.report.tables import Table, markdown
+from benchmarks.trade import page as trade_page
+from benchmarks.trade import store
+from benchmarks.trade.measure import TRIALS
 
-PAGES = (ROOT / "README.md", ROOT / "docs" / "benchmarks.md")
+PAGES = (ROOT / "README.md", ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "trade.md")
 RUNS = "runs"  # in place of a table: what the tables of the page were measured on
 SUMMARY = "summary"
 _BLOCK = re.compile(r"(<!-- figures: ([^>]*?) -->\n).*?(<!-- /figures -->)", re.DOTALL)
@@ -97,6 +100,14 @@ def run() -> None:
         text = page.read_text(encoding="utf-8")
         page.write_text(page_text(text, saved), encoding="utf-8")
         print(f"written: {page.relative_to(ROOT)}")
+    trade_page.PATH.write_text(trade_text(saved), encoding="utf-8")
+    print(f"written: {trade_page.PATH.relative_to(ROOT)}")
+
+
+def trade_text(saved: Saved) -> str:
+    """The page docs/trade/index.html of the measured trade."""
+    run = describe(saved.runs["trade many"]).replace("\n", "; ")
+    return trade_page.page(store.load(), TRIALS, run)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.draw import env_steps, tasks, work_precision
+from benchmarks.draw import env_steps, tasks, trade
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.results_file import load
 from benchmarks.report.tables import Table
+from benchmarks.trade import impacts, rotating, sliding, standing, store
 
 
 class Plot(NamedTuple):
@@ -31,16 +32,23 @@ class Plot(NamedTuple):
 
 PLOTS = {
     "env_steps": Plot("worlds", env_steps.draw, ROOT / "docs/images/env_steps.png"),
-    "work_precision": Plot(
-        "work precision", work_precision.draw, ROOT / "docs/images/work_precision.png"
-    ),
 }
 TASKS = ROOT / "docs/images/tasks.png"
+# plots of docs/trade/trade.csv: their trials
+TRADE = {
+    ROOT / "docs/images/trade.png": (
+        "slide", "incline, rest", "bounce, e = 0.5", "tower of 10", "250 : 1", "grasp",
+    ),
+    ROOT / "docs/trade/friction.png": tuple(trial.name for trial in sliding.TRIALS),
+    ROOT / "docs/trade/impacts.png": tuple(trial.name for trial in impacts.TRIALS),
+    ROOT / "docs/trade/standing.png": tuple(trial.name for trial in standing.TRIALS),
+    ROOT / "docs/trade/rotation.png": tuple(trial.name for trial in rotating.TRIALS),
+}  # fmt: skip
 
 
 def run() -> None:
     """Draws all pictures, or those named."""
-    names = [*PLOTS, "tasks"]
+    names = [*PLOTS, "trade", "tasks"]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
     options = parser.parse_args()
@@ -51,6 +59,12 @@ def run() -> None:
         if name == "tasks":
             os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
             tasks.draw(path := TASKS)
+        elif name == "trade":
+            rows = store.load()
+            for path, trials in TRADE.items():
+                trade.draw(rows, trials, path)
+                print(f"written: {path.relative_to(ROOT)}")
+            continue
         else:
             table, draw, path = PLOTS[name]
             if table not in saved.tables:

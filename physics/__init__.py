@@ -19,6 +19,7 @@ from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
 from physics.scene.torus import Torus
 from physics.step.readout import Readout
+from physics.tuning.tune import Tuned, tune
 from physics.world import Snapshot, World
 
 __all__ = [
@@ -57,6 +58,8 @@ __all__ = [
     "StepVanished",
     "SurfaceDrag",
     "Torus",
+    "Tuned",
     "Weld",
     "World",
+    "tune",
 ]

@@ -11,7 +11,8 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.peers.mujoco_scene import MujocoWorld
+from benchmarks.peers.mujoco_scene import MujocoOptions
+from benchmarks.peers.mujoco_worlds import MujocoWorlds
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity, Scene, World
 from physics.reference.measures import (
@@ -39,8 +40,8 @@ def _engines() -> dict[str, Make]:
     def ours(fidelity: Fidelity, scene: Scene) -> World:
         return World(scene, fidelity, threads=1)
 
-    def theirs(step: float, scene: Scene) -> MujocoWorld:
-        return MujocoWorld(scene, step)
+    def theirs(step: float, scene: Scene) -> MujocoWorlds:
+        return MujocoWorlds(scene, MujocoOptions(step))
 
     presets = {name: partial(ours, fidelity) for name, fidelity in PRESETS.items()}
     steps = [fidelity.substep for fidelity in PRESETS.values()]
@@ -59,7 +60,7 @@ def restitution_rows() -> Iterator[list[Cell]]:
             yield [f"e = {e:g}: error of e", "1e-3 accurate, solid", *largest]
 
 
-def drifts(world: World | MujocoWorld) -> list[Cell]:
+def drifts(world: World | MujocoWorlds) -> list[Cell]:
     """Largest relative drift of energy and of angular momentum over 10 s."""
     energy, momentum = world.kinetic_energy()[0], world.angular_momentum()[0].copy()
     largest = np.zeros(2)
@@ -99,10 +100,10 @@ def measure() -> Iterator[Table]:
     yield Table("restitution", title, ["error", "target", *PRESETS], list(restitution_rows()))
 
     box = torque_free_box()
-    worlds: dict[str, World | MujocoWorld] = {
+    worlds: dict[str, World | MujocoWorlds] = {
         "rigid-envs": World(box, Fidelity(substep=1e-3), threads=1),
-        "MuJoCo, Euler": MujocoWorld(box, 1e-3),
-        "MuJoCo, RK4": MujocoWorld(box, 1e-3, "RK4"),
+        "MuJoCo, Euler": MujocoWorlds(box, MujocoOptions(1e-3)),
+        "MuJoCo, RK4": MujocoWorlds(box, MujocoOptions(1e-3, "RK4")),
     }
     rows = [[name, *drifts(world)] for name, world in worlds.items()]
     rows.append(["target", "1e-6", "round-off"])

@@ -10,7 +10,7 @@ from mujoco import MjData, mjtState, rollout
 from mujoco.batch import Batch
 
 from benchmarks.measure.episodes import recorded_episode
-from benchmarks.peers.mujoco_scene import model_of
+from benchmarks.peers.mujoco_scene import MujocoOptions, model_of
 from benchmarks.report.provenance import THREADS
 from benchmarks.report.timing import Side
 from rigid_envs.tasks import TASKS
@@ -23,7 +23,7 @@ def mujoco_sides(task: str, worlds: int = 256, trained: bool = False) -> dict[st
     """Each call is an episode of `mujoco.rollout`, or of `mujoco.batch` driven step by step."""
     world, position, orientation, path = recorded_episode(task, worlds, trained=trained)
     steps = path.shape[1] - 1
-    model = model_of(world.scene, TASKS[task].frame / SUBSTEPS, cone="pyramidal")
+    model = model_of(world.scene, MujocoOptions(TASKS[task].frame / SUBSTEPS, cone="pyramidal"))
     state = np.zeros((worlds, 1 + model.nq + model.nv))
     pose = np.concatenate([position, np.roll(orientation, 1, axis=-1)], axis=-1)
     state[:, 1 : 1 + model.nq] = pose.reshape(worlds, -1)

@@ -1,7 +1,7 @@
-"""One of our scenes as a MuJoCo model, with MuJoCo's default options."""
+"""One of our scenes as a MuJoCo model."""
 
 import math
-from typing import Any
+from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
@@ -11,11 +11,38 @@ try:
 except ModuleNotFoundError:
     raise SystemExit("MuJoCo is missing: pip install -e '.[bench]', or make bench") from None
 
-from physics import Body, Box, Capsule, Drive, Ground, Scene, Sphere, Static
-from physics.rotation import rotate, rotate_back
+from physics import BallJoint, Body, Box, Capsule, Drive, Ground, Hinge, Scene, Slider, Sphere
+from physics.rotation import rotate_back
 from physics.scene.shapes import Shape
 
 Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class MujocoOptions:
+    """What MuJoCo's users trade for speed; all but the step and the cone are its defaults.
+
+    Args:
+        timestep: s.
+        integrator: "Euler", "RK4", "implicit" or "implicitfast".
+        cone: "elliptic", which is Coulomb's, or "pyramidal".
+        solver: "Newton", "CG" or "PGS".
+        iterations: of the solver, at most.
+        impratio: how much stiffer friction is than the normal force.
+        noslip: iterations of the solver that removes slip.
+        solref: time constant in s and damping ratio of a contact; negative: stiffness and damping.
+        solimp: impedance of a contact at its surface and at its depth, and that depth in m.
+    """
+
+    timestep: float = 2e-3
+    integrator: str = "Euler"
+    cone: str = "elliptic"
+    solver: str = "Newton"
+    iterations: int = 100
+    impratio: float = 1.0
+    noslip: int = 0
+    solref: tuple[float, float] = (0.02, 1.0)
+    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
 
 
 def _text(*values: float) -> str:
@@ -37,26 +64,51 @@ def _geom(parent: Element, name: str, shape: Shape, mass: float | None) -> None:
         geom.set("mass", _text(mass))
 
 
-def model_of(
-    scene: Scene, timestep: float, integrator: str = "Euler", cone: str = "elliptic"
-) -> mujoco.MjModel:
+def _joint(parent: Element, scene: Scene, body: int) -> None:
+    """The joint of a body to the world; a free one if the scene has none."""
+    solid = scene.bodies[body]
+    for joint in scene.joints:
+        if scene.joint_ends(joint) != (body, None):
+            continue
+        assert isinstance(joint, BallJoint | Hinge | Slider)
+        assert joint.anchor is not None
+        away = np.subtract(joint.anchor, solid.position)
+        turn = np.array(solid.orientation)
+        kinds = {BallJoint: "ball", Hinge: "hinge", Slider: "slide"}
+        found = SubElement(parent, "joint", type=kinds[type(joint)])
+        found.set("pos", _text(*rotate_back(turn, away)))
+        if not isinstance(joint, BallJoint):
+            found.set("axis", _text(*rotate_back(turn, np.array(joint.axis))))
+        return
+    SubElement(parent, "freejoint")
+
+
+def model_of(scene: Scene, options: MujocoOptions, *, grip: bool = False) -> mujoco.MjModel:
     """A model of the same solids, masses, friction and gravity.
 
-    Bodies have free joints. A drive is a mocap body: it follows its path whatever it meets, and
-    costs MuJoCo the least. Contact pairs are listed, with the geometric mean of both frictions.
-    MuJoCo has no coefficient of restitution and no contact stiffness in N/m: its own contact
-    parameters keep their defaults.
+    Contact pairs are listed, with the geometric mean of both frictions. MuJoCo has no coefficient
+    of restitution and no contact stiffness in N/m: all contacts have those of `options`.
 
     Args:
-        scene: solids and gravity.
-        timestep: s.
-        integrator: name of a MuJoCo integrator.
-        cone: "elliptic", which is exact, or "pyramidal".
+        scene: bodies, at most one joint of each to the world, drives, statics and gravity.
+        options: step, solver and contact parameters.
+        grip: fingers of grippers press with their grip limit, each on a slide joint. Otherwise they
+            are, as all drives, mocap bodies: they follow their path whatever they meet, and cost
+            MuJoCo the least.
     """
     root = Element("mujoco")
-    option = SubElement(root, "option", integrator=integrator, cone=cone)
-    option.attrib.update(timestep=_text(timestep), gravity=_text(*scene.gravity))
+    option = SubElement(root, "option", integrator=options.integrator, cone=options.cone)
+    option.attrib.update(
+        timestep=_text(options.timestep), gravity=_text(*scene.gravity), solver=options.solver,
+        iterations=str(options.iterations), impratio=_text(options.impratio),
+        noslip_iterations=str(options.noslip),
+    )  # fmt: skip
     world, contact = SubElement(root, "worldbody"), SubElement(root, "contact")
+    actuators = SubElement(root, "actuator")
+    pressing = {}
+    if grip:
+        for first, gripper in scene.grippers:
+            pressing[first], pressing[first + 1] = gripper.grip_limit, -gripper.grip_limit
     solids = [*scene.bodies, *scene.driven_bodies, *scene.statics]
     for i, solid in enumerate(solids):
         name = f"solid{i}"
@@ -66,73 +118,29 @@ def model_of(
             continue
         x, y, z, w = solid.orientation
         body = SubElement(world, "body", pos=_text(*solid.position), quat=_text(w, x, y, z))
+        mass = solid.mass if isinstance(solid, Body) else None
+        finger = i - len(scene.bodies)
         if isinstance(solid, Body):
-            SubElement(body, "freejoint")
+            _joint(body, scene, i)
+        elif finger in pressing:
+            assert isinstance(solid, Drive)
+            mass = solid.mass
+            SubElement(body, "joint", name=name, type="slide", axis="0 1 0")
+            body.set("gravcomp", "1")
+            motor = SubElement(actuators, "general", joint=name, biastype="affine")
+            motor.set("gainprm", "0")
+            motor.set("biasprm", _text(pressing[finger], 0, 0))
         elif isinstance(solid, Drive):
             body.set("mocap", "true")
-        _geom(body, name, solid.shape, solid.mass if isinstance(solid, Body) else None)
+        _geom(body, name, solid.shape, mass)
     for i, a in enumerate(scene.bodies):
         for j in range(i + 1, len(solids)):
-            b: Body | Drive | Static | Ground = solids[j]
+            b = solids[j]
             friction = math.sqrt(a.material.friction * b.material.friction)
             pair = SubElement(contact, "pair", geom1=f"solid{i}", geom2=f"solid{j}")
             # sliding twice, then torsion and rolling, which contacts with condim=3 ignore
             pair.set("friction", _text(friction, friction, 0.005, 0.0001, 0.0001))
             pair.set("condim", "3" if friction > 0.0 else "1")
+            pair.set("solref", _text(*options.solref))
+            pair.set("solimp", _text(*options.solimp))
     return mujoco.MjModel.from_xml_string(tostring(root, encoding="unicode"))
-
-
-class MujocoWorld:
-    """One world of a scene without drives in MuJoCo, with the interface of a physics.World."""
-
-    def __init__(
-        self, scene: Scene, timestep: float, integrator: str = "Euler", cone: str = "elliptic"
-    ) -> None:
-        """Sets the bodies to the initial state of the scene."""
-        self._model = model_of(scene, timestep, integrator, cone)
-        self._data = mujoco.MjData(self._model)
-        # a free joint has seven coordinates and six speeds; the angular ones in the body's frame
-        self._place = self._data.qpos.reshape(1, -1, 7)
-        self._motion = self._data.qvel.reshape(1, -1, 6)
-        masses = [float(b.mass or 0.0) for b in scene.bodies]
-        self._mass = np.array(masses)[:, None]
-        self._inertia = np.array(
-            [b.shape.inertia(m) for b, m in zip(scene.bodies, masses, strict=True)]
-        )
-        self.set_state(linear_velocity=[b.linear_velocity for b in scene.bodies])
-        spin = np.array([b.angular_velocity for b in scene.bodies])
-        self._motion[..., 3:] = rotate_back(self.orientation, spin)
-
-    def advance(self, time: float) -> None:
-        """Advances by `time` s, rounded to whole steps."""
-        mujoco.mj_step(self._model, self._data, nstep=round(time / self._model.opt.timestep))
-
-    def set_state(self, *, linear_velocity: Any) -> None:
-        """Writes velocities in m/s, of a shape that broadcasts to [1, bodies, 3]."""
-        self._motion[..., :3] = linear_velocity
-
-    @property
-    def position(self) -> Array:
-        """[1, bodies, 3] m."""
-        return self._place[..., :3]
-
-    @property
-    def orientation(self) -> Array:
-        """[1, bodies, 4] unit quaternions x y z w."""
-        return np.roll(self._place[..., 3:], -1, axis=-1)
-
-    @property
-    def linear_velocity(self) -> Array:
-        """[1, bodies, 3] m/s."""
-        return self._motion[..., :3]
-
-    def kinetic_energy(self) -> Array:
-        """[1] J."""
-        terms = self._mass * self._motion[..., :3] ** 2 + self._inertia * self._motion[..., 3:] ** 2
-        return 0.5 * terms.sum(axis=(1, 2))
-
-    def angular_momentum(self) -> Array:
-        """[1, 3] kg m^2/s about the origin."""
-        spin = rotate(self.orientation, self._inertia * self._motion[..., 3:])
-        orbital = np.cross(self.position, self._mass * self.linear_velocity)
-        return (spin + orbital).sum(axis=1)

@@ -133,6 +133,14 @@ def _parser() -> argparse.ArgumentParser:
     flags.add_training(tuning)
     flags.add_tuning(tuning)
 
+    fidelity = command(
+        "tune-fidelity",
+        handlers.tune_fidelity,
+        "Find the cheapest fidelity whose error in an environment is within a tolerance.",
+        ("train", ("yaml",)),
+    )
+    flags.add_fidelity_tuning(fidelity)
+
     demonstration = command(
         "demo",
         handlers.demo,

@@ -92,6 +92,36 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=count, help="(default: all cores)")
 
 
+def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
+    """Flags of the search for a fidelity."""
+    parser.set_defaults(
+        algo=None, fidelity=None, stochastic=False, trust_pickle=False, device="cpu"
+    )
+    parser.add_argument("--env", default=DEFAULT_ENV, help="environment id (default: %(default)s)")
+    parser.add_argument(
+        "--policy", default="scripted", metavar="POLICY",
+        help='whose actions are repeated: run folder, .policy file or "scripted" (default)',
+    )  # fmt: skip
+    parser.add_argument(
+        "--tolerance", type=positive, default=1e-3,
+        help="largest error, in the unit of the metric (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--metric", default="position",
+        help="position (m), orientation (rad), velocity (m/s), energy (relative) or penetration "
+        "(m); default: position",
+    )  # fmt: skip
+    parser.add_argument(
+        "--time", type=positive, default=1.0, help="s of each episode (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--law", help="contact law of the reference: spring or impulse (default: impulse)"
+    )
+    parser.add_argument("--seed", type=whole, help="of the first episode (default: 0)")
+    add_env_kwargs(parser)
+    add_folder(parser)
+
+
 def add_latest(parser: argparse.ArgumentParser) -> None:
     """Flags that select the latest run, or describe a model.zip outside a run folder."""
     parser.add_argument(
@@ -252,6 +282,11 @@ def add_environment(parser: argparse.ArgumentParser) -> None:
         help="fidelity preset: fast, balanced, accurate or solid (default: as in the settings or "
         "the policy, otherwise balanced)",
     )
+    add_env_kwargs(parser)
+
+
+def add_env_kwargs(parser: argparse.ArgumentParser) -> None:
+    """The flag for arguments of the environment."""
     parser.add_argument(
         "--env-kwargs",
         nargs="+",

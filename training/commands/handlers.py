@@ -64,6 +64,20 @@ def scripted(options: argparse.Namespace) -> int:
     return evaluate(options)
 
 
+def tune_fidelity(options: argparse.Namespace) -> int:
+    """Prints the cheapest fidelity within a tolerance; 1 if there is none."""
+    from training.commands import fidelity_tuning
+
+    try:
+        tuned = fidelity_tuning.run(
+            policy_of(options), options.tolerance, options.metric, options.time, options.law,
+            options.seed or 0,
+        )  # fmt: skip
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    return 0 if tuned.fidelity is not None else 1
+
+
 def record(options: argparse.Namespace) -> int:
     """Records a video of a policy."""
     from training.results import video

@@ -1,0 +1,92 @@
+"""docs/trade/trade.csv: one row per trial and setting. A run that was interrupted resumes there."""
+
+import csv
+import hashlib
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.report.provenance import ROOT
+
+PATH = ROOT / "docs" / "trade" / "trade.csv"
+
+
+class Row(NamedTuple):
+    """A setting in a trial.
+
+    Attributes:
+        trial: name of the trial.
+        engine: "rigid-envs" or "MuJoCo".
+        curve: settings that differ only in their step share a curve.
+        label: step, tolerance or preset.
+        options: the Fidelity or MuJoCo's options, as Python text.
+        status: "stable", "diverged" or "refused".
+        error: see the trial; nan if there is none.
+        energy: largest relative gain of energy.
+        penetration: m, deepest.
+        one: simulated s per s of one world; nan if not measured.
+        many: simulated s per s of 4,096 worlds together.
+        note: why a setting was refused or diverged.
+    """
+
+    trial: str
+    engine: str
+    curve: str
+    label: str
+    options: str
+    status: str
+    error: float
+    energy: float
+    penetration: float
+    one: float
+    many: float
+    note: str = ""
+
+
+_NUMBERS = ("error", "energy", "penetration", "one", "many")
+
+
+def load(path: Path = PATH) -> list[Row]:
+    """All rows of a file; none if it doesn't exist.
+
+    Raises:
+        ValueError: the file has other columns.
+    """
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != Row._fields:
+            raise ValueError(f"{path.name} has the columns {reader.fieldnames}, not {Row._fields}")
+        rows = []
+        for found in reader:
+            values: dict[str, str | float] = dict(found)
+            for name in _NUMBERS:
+                values[name] = float(found[name]) if found[name] else math.nan
+            rows.append(Row(**values))  # type: ignore[arg-type]
+    return rows
+
+
+def append(rows: Iterable[Row], path: Path = PATH) -> None:
+    """Adds rows at the end of a file, which is created if it doesn't exist."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = not path.exists()
+    with path.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if new:
+            writer.writerow(Row._fields)
+        for row in rows:
+            writer.writerow(_cell(value) for value in row)
+
+
+def _cell(value: str | float) -> str:
+    if isinstance(value, str):
+        return value
+    return "" if math.isnan(value) else f"{value:.4g}"
+
+
+def digest(rows: Iterable[Row]) -> str:
+    """SHA-256 of rows, in hexadecimal."""
+    text = "\n".join(",".join(_cell(value) for value in row) for row in rows)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,1 @@
+"""What a fidelity means for a scene, and the cheapest one that is accurate enough for it."""

@@ -1,0 +1,226 @@
+"""explain: what a fidelity models of a scene and what it leaves out, its limits and its cost."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from physics.analysis import stability
+from physics.analysis.field_limits import longest_step
+from physics.analysis.integrator_limits import check_integrator
+from physics.analysis.step_limits import check_step
+from physics.model.build import build
+from physics.model.features import GENERAL, ISOTROPIC, Features
+from physics.model.tables import Model
+from physics.scene.drives import Drive
+from physics.scene.fidelity import FIND_IMPACTS, Fidelity
+from physics.scene.scene import Scene
+from physics.scene.solids import Body, Ground
+from physics.tuning.candidates import can_touch
+from physics.tuning.description import code
+from physics.tuning.parts_cost import parts_cost
+
+_MANY = 32  # bodies beyond which a world isn't advanced with others side by side
+_WORLDS = 16  # side by side
+_KINDS = 6  # different bodies that are listed
+_PAIRS = 12  # different contacts that are listed
+
+_ORDERS = {
+    "midpoint": "midpoint rule (kick-drift-kick), second order, symplectic",
+    "euler": "semi-implicit Euler, first order, symplectic",
+    "rk4": "classical Runge-Kutta, fourth order",
+    "adaptive": "Dormand-Prince pair with adaptive steps",
+}
+
+
+def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
+    """What a fidelity means for a scene, as text.
+
+    It says what is modelled and what is left out, the largest stable step, the stiffness of
+    contacts, how deep bodies sink at rest, and what each part costs.
+
+    Args:
+        scene: the scene.
+        fidelity: the fidelity.
+        costs: measure costs, which takes a second, and up to a minute where kernels are compiled.
+    """
+    few = _kinds(scene)
+    model, features = build(few, fidelity)
+    lines = [code(fidelity), "", "Models"]
+    lines += [f"  {line}" for line in _modelled(scene, fidelity, features)]
+    lines += ["", "Leaves out"]
+    lines += [f"  {line}" for line in _left_out(scene, fidelity, features)]
+    lines += ["", "Steps"]
+    lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
+    if len(model.half_pair):
+        lines += ["", "Contacts"]
+        lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
+    if costs:
+        many = len(scene.bodies) > _MANY
+        lines += ["", "Cost per substep of one world, one thread" if many else
+                  "Cost per substep of one of many worlds, one thread"]  # fmt: skip
+        lines += [f"  {line}" for line in _costs(scene, fidelity, 1 if many else _WORLDS)]
+    return "\n".join(lines)
+
+
+def _kinds(scene: Scene) -> Scene:
+    """A scene with at most two of each kind of body, without joints and fields on others."""
+    if len(scene.bodies) <= 2 * _KINDS:
+        return scene
+    known: dict[tuple[Any, ...], int] = {}
+    bodies = []
+    for body in scene.bodies:
+        key = body.shape, body.mass, body.material, body.group, body.mask
+        known[key] = known.get(key, 0) + 1
+        if known[key] <= 2 and len(known) <= _KINDS:
+            bodies.append(body)
+    return replace(scene, bodies=bodies, fields=(), joints=())
+
+
+def _modelled(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[str]:
+    yield f"motion: {_ORDERS[fidelity.integrator]}"
+    if features.rotation == GENERAL:
+        yield "rotation: all of Euler's equations, gyroscopic terms included"
+    elif features.rotation == ISOTROPIC:
+        yield "rotation: of bodies with equal moments of inertia, which have no gyroscopic terms"
+    if can_touch(scene):
+        geometry = "samples against exact surfaces"
+        if fidelity.geometry == "particle":
+            geometry = "spheres against spheres"
+        if fidelity.law == "impulse":
+            yield f"contacts: impulses that stop approach, {geometry}; restitution is exact"
+        elif fidelity.damping == "hunt_crossley":
+            yield f"contacts: springs with Hunt-Crossley damping, {geometry}"
+        else:
+            yield f"contacts: springs with linear dashpots, {geometry}"
+        if features.friction and features.viscous:
+            yield "friction: proportional to slip, up to Coulomb's limit"
+        elif features.friction:
+            yield "friction: Coulomb's, static and sliding"
+        if features.resistance:
+            yield "rolling and spinning resistance"
+    if scene.drives:
+        yield f"drives: {len(scene.driven_bodies)} solids moved by servos with force limits"
+    if scene.joints:
+        yield f"joints: {len(scene.joints)}, held to round-off"
+    if scene.fields:
+        names = sorted({type(field).__name__ for field in scene.fields})
+        yield f"fields: {', '.join(names)}"
+    if features.time_control:
+        yield f"time control: {fidelity.time_control}"
+
+
+def _left_out(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[str]:
+    touching = can_touch(scene)
+    if not touching:
+        yield "contacts: nothing can touch, none are compiled in"
+    if features.rotation not in (GENERAL, ISOTROPIC):
+        yield "rotation: nothing can make the bodies turn"
+    if touching and not features.friction:
+        yield "friction: every pair has the coefficient 0"
+    if touching and features.friction and features.viscous:
+        yield "static friction: bodies at rest on slopes creep"
+    if touching and fidelity.law == "spring" and fidelity.damping == "dashpot":
+        yield "restitution that doesn't depend on the moment of first contact within a step"
+    if touching and not features.resistance:
+        yield "rolling and spinning resistance: every coefficient is 0"
+    if touching and fidelity.law == "impulse":
+        yield "the course of an impact in time: a collision is over within a substep"
+        solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
+        if any(solid.material.stiffness is not None for solid in solids):
+            yield "elastic deformation: impulses use Material.stiffness only for soft contacts"
+    if touching and fidelity.time_control not in FIND_IMPACTS:
+        thin = min(
+            solid.shape.width
+            for solid in (*scene.bodies, *scene.driven_bodies, *scene.statics)
+            if not isinstance(solid, Ground)
+        )
+        speed = 0.5 * thin / fidelity.substep
+        if fidelity.time_control == "fixed":
+            yield (
+                f"impacts within a step: what is faster than {speed:.3g} m/s can pass through the "
+                f"thinnest solid, {1e3 * thin:.3g} mm; time_control='swept' prevents it"
+            )
+    if touching and fidelity.geometry == "shape":
+        yield f"sharp edges: boxes are rounded by {100 * fidelity.rounding:.3g} % of a half width"
+    if not scene.drives and not scene.joints and not scene.fields:
+        yield "drives, joints, fields: there are none"
+
+
+def _steps(
+    scene: Scene, few: Scene, fidelity: Fidelity, model: Model, features: Features
+) -> Iterator[str]:
+    if fidelity.integrator == "adaptive":
+        yield f"chosen by the integrator, for an error of {fidelity.tolerance:g} per second"
+        return
+    step = fidelity.substep
+    longest, limiting = stability.of_scene(few, model, features, fidelity.spacing)
+    by_fields = longest_step(few, model, fidelity.integrator)[0] if few.fields else math.inf
+    name = few.solid_names[limiting]
+    if by_fields < longest:
+        longest, name = by_fields, "a field"
+    yield f"substep {1e3 * step:.4g} ms"
+    if math.isinf(longest):
+        impulses = fidelity.law == "impulse" and len(model.half_pair) > 0
+        why = ", contacts with impulses are stable at any step" if impulses else ""
+        yield f"largest stable substep: nothing limits it{why}"
+    else:
+        yield f"largest substep that is stable whatever touches: {1e3 * longest:.3g} ms, by {name}"
+        if step > longest and fidelity.law == "spring":
+            yield "a longer one is stable unless that lies flat on several others at once"
+        solids = (*few.bodies, *few.driven_bodies, *few.statics)
+        if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
+            yield "shorter substeps make contacts stiffer: no material gives a stiffness"
+    try:
+        check_integrator(few, fidelity, model)
+        check_step(few, fidelity, model, features)
+    except ValueError as error:
+        yield f"a World refuses it: {error}"
+
+
+def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:
+    """Per kind of pair: stiffness, phase per step, sink at rest, restitution, friction."""
+    solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
+    gravity = float(np.linalg.norm(scene.gravity))
+    yield "pair                             N/m   rad per step  sink at rest      e   friction"
+    listed: dict[tuple[str, ...], str] = {}
+    for row in model.half_pair:
+        i, j = int(row["owner"]), int(row["surface"])
+        # the load of what rests on it: the lighter of two bodies, or the body on a static
+        masses = [float(s.mass or 0.0) for s in (solids[i], solids[j]) if isinstance(s, Body)]
+        sink = gravity * min(masses) / float(row["stiffness"]) if masses else 0.0
+        phase = fidelity.substep * math.sqrt(float(row["stiffness"] / row["pair_mass"]))
+        kinds = _kind(solids[i]), _kind(solids[j])
+        pair = " on ".join(kinds)
+        line = (
+            f"{pair[:28]:28} {row['stiffness']:9.3g}   {phase:12.3g}  {1e3 * sink:9.3g} mm  "
+            f"{row['restitution']:5.3g}   {row['friction']:8.3g}"
+        )
+        listed.setdefault(tuple(sorted(kinds)), line)
+    yield from list(listed.values())[:_PAIRS]
+    if len(listed) > _PAIRS:
+        yield f"and {len(listed) - _PAIRS} more"
+    yield "a body sinks by its own weight; below others, by theirs too"
+
+
+def _kind(solid: Any) -> str:
+    if isinstance(solid, Ground):
+        return "Ground"
+    kind = "Drive" if isinstance(solid, Drive) else type(solid).__name__
+    shape = type(solid.shape).__name__
+    name = solid.name or f"{kind} {shape}" if kind != "Body" else solid.name or shape
+    return f"{name} {solid.mass:.3g} kg" if isinstance(solid, Body) else name
+
+
+def _costs(scene: Scene, fidelity: Fidelity, worlds: int) -> Iterator[str]:
+    parts = parts_cost(scene, fidelity, worlds)
+    whole = sum(part.cost for part in parts if part.cost < math.inf)
+    for part in parts:
+        if math.isinf(part.cost):
+            yield f"{part.name:18} can't be simulated alone"
+        else:
+            yield f"{part.name:18} {1e9 * part.cost:8,.0f} ns  {100 * part.cost / whole:4.0f} %"
+    if fidelity.integrator != "adaptive":
+        yield f"{'all':18} {1e9 * whole:8,.0f} ns, {fidelity.substep / whole:,.0f} simulated s/s"

@@ -1,0 +1,133 @@
+"""The motion of a scene at a fidelity, read at regular times, and what it cost."""
+
+import math
+from collections.abc import Callable
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.errors import SimulationDiverged
+from physics.scene.fidelity import Fidelity
+from physics.scene.scene import Scene
+from physics.world import World
+
+Array = np.ndarray
+
+# called once before the first frame
+Start = Callable[[World], None]
+# called before every frame with its index
+Control = Callable[[World, int], None]
+
+FRAME = 0.04  # s, a frame of the environments
+_MEASURED = 0.02  # s, shortest wall time whose measurement counts
+_REPEATS = 20  # at most, to reach it
+
+
+class Motion(NamedTuple):
+    """What was read at the start and after every frame.
+
+    Attributes:
+        position: [frames + 1, worlds, bodies, 3] m.
+        orientation: [frames + 1, worlds, bodies, 4] x y z w.
+        velocity: [frames + 1, worlds, bodies, 3] m/s.
+        energy: [frames + 1, worlds] J, kinetic and potential.
+        kinetic: [frames + 1, worlds] J.
+        penetration: [frames + 1, worlds] m.
+    """
+
+    position: Array
+    orientation: Array
+    velocity: Array
+    energy: Array
+    kinetic: Array
+    penetration: Array
+
+
+class Simulated(NamedTuple):
+    """A motion, or why there is none.
+
+    Attributes:
+        motion: None if the fidelity is refused or the simulation diverges.
+        cost: wall time in s per simulated s of one world, on one thread.
+        note: the message of the error, "" if there is none.
+    """
+
+    motion: Motion | None
+    cost: float = math.inf
+    note: str = ""
+
+
+class Course(NamedTuple):
+    """What happens in a scene, whatever the fidelity.
+
+    Attributes:
+        scene: what is in each world.
+        frames: number of frames.
+        frame: s.
+        worlds: number of worlds that are simulated side by side.
+        start: sets the initial states; None: those of the scene.
+        control: moves drives and motors; None: nothing does.
+    """
+
+    scene: Scene
+    frames: int
+    frame: float
+    worlds: int
+    start: Start | None = None
+    control: Control | None = None
+
+    @property
+    def simulated(self) -> float:
+        """Simulated s of all worlds together."""
+        return self.frames * self.frame * self.worlds
+
+
+def simulate(course: Course, fidelity: Fidelity, *, timed: bool = True) -> Simulated:
+    """Simulates a course at a fidelity.
+
+    Args:
+        course: what happens.
+        fidelity: how accurately it is simulated.
+        timed: repeat short simulations until their cost can be measured.
+    """
+    try:
+        world = World(course.scene, fidelity, course.worlds, threads=1)
+        # compiles, so that the cost is that of later runs
+        world.advance(fidelity.substep)
+        motion, spent = _run(world, course)
+        shortest, total, repeats = spent, spent, 1
+        while timed and total < _MEASURED and repeats < _REPEATS:
+            again = _run(world, course)[1]
+            shortest, total, repeats = min(shortest, again), total + again, repeats + 1
+    except (ValueError, SimulationDiverged) as error:
+        return Simulated(None, note=str(error))
+    return Simulated(motion, shortest / course.simulated)
+
+
+def _run(world: World, course: Course) -> tuple[Motion, float]:
+    """The motion, and the s that the engine needed for it."""
+    world.reset()
+    if course.start is not None:
+        course.start(world)
+    frames, spent = [_read(world)], 0.0
+    for k in range(course.frames):
+        if course.control is not None:
+            course.control(world, k)
+        begin = perf_counter()
+        world.advance(course.frame)
+        spent += perf_counter() - begin
+        frames.append(_read(world))
+    return Motion(*(np.stack(values) for values in zip(*frames, strict=True))), spent
+
+
+def _read(world: World) -> tuple[Array, ...]:
+    kinetic = world.kinetic_energy()
+    return (
+        world.position.copy(),
+        world.orientation.copy(),
+        world.linear_velocity.copy(),
+        kinetic + world.potential_energy(),
+        kinetic,
+        world.penetration().copy(),
+    )

@@ -1,0 +1,81 @@
+"""Finds the cheapest fidelity that moves a task's solids as a fine simulation does."""
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from physics import Tuned, World, tune
+from rigid_envs.episodes.runner import Runner
+from training.policies.policy import Policy
+from training.settings.environments import make_vector_env
+
+Array = np.ndarray
+
+WORLDS = 16  # episodes
+RECORDED_AT = "balanced"  # fidelity at which the actions are recorded
+
+
+def recorded(policy: Policy, steps: int, seed: int) -> tuple[Any, Array]:
+    """Plays episodes, and returns their environment at the start and the actions.
+
+    Args:
+        policy: what acts.
+        steps: number of environment steps.
+        seed: of the first episode.
+
+    Returns:
+        The vector environment, reset to the start of the episodes, and actions [steps, worlds, n].
+    """
+    kwargs = {**policy.env_kwargs, "max_episode_steps": -1}
+    kwargs.setdefault("fidelity", RECORDED_AT)
+    envs = make_vector_env(policy.env_id, WORLDS, **kwargs)
+    observation, _ = envs.reset(seed=seed)
+    actions = []
+    for _ in range(steps):
+        actions.append(np.asarray(policy.act(observation), dtype=np.float64))
+        observation, *_ = envs.step(actions[-1].astype(np.float32))
+    envs.reset(seed=seed)
+    return envs, np.stack(actions)
+
+
+def course(runner: Runner, actions: Array) -> tuple[Callable[[World], None], Any]:
+    """What happens in the worlds of an environment: its present state, then these actions."""
+    world, task = runner.world, runner.task
+    states = {
+        name: getattr(world, name).copy()
+        for name in ("position", "orientation", "linear_velocity", "angular_velocity")
+    }
+    drives = {"drive_position": world.drive_position.copy()}
+
+    def start(simulated: World) -> None:
+        simulated.set_state(**states, **drives)
+
+    def control(simulated: World, frame: int) -> None:
+        task.act(simulated, simulated.read(), actions[frame])
+
+    return start, control
+
+
+def run(
+    policy: Policy, tolerance: float, metric: str, time: float, law: str | None, seed: int
+) -> Tuned:
+    """Tunes for the episodes of a policy, whose actions are repeated at every fidelity."""
+    envs, actions = recorded(policy, max(1, round(time / 0.04)), seed)
+    runner: Runner = envs.unwrapped._runner
+    start, control = course(runner, np.clip(actions, -1.0, 1.0))
+    print(f"{policy.env_id}, {WORLDS} episodes of {policy.name}, the first {time:g} s")
+    tuned = tune(
+        runner.world.scene, tolerance, metric, time=time, law=law, start=start, control=control,
+        worlds=WORLDS, progress=_show,
+    )  # fmt: skip
+    _show("")
+    print(tuned)
+    return tuned
+
+
+def _show(line: str) -> None:
+    """A line that replaces the last one; nothing where the output is not a terminal."""
+    if sys.stderr.isatty():
+        print(f"\r{line:60}", end="" if line else "\r", file=sys.stderr, flush=True)
