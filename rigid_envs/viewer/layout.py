@@ -31,7 +31,7 @@ class Layout:
     def half_width(self) -> float:
         """Half the width of a floor in m, a multiple of `CELL`."""
         seen = self.camera.distance * math.tan(math.radians(0.5 * self.camera.field_of_view))
-        return CELL * math.ceil(seen / CELL)
+        return CELL * max(1, round(seen / CELL))
 
     @property
     def centre(self) -> Array:

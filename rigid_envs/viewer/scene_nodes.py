@@ -168,7 +168,7 @@ def _add_light(scene: viser.SceneApi) -> None:
     scene.add_light_directional(
         "/sun",
         color=(255, 250, 240),
-        intensity=2.2,
+        intensity=2.8,
         cast_shadow=True,
         position=(x, y, z),
     )

@@ -140,8 +140,8 @@ class ViewServer:
             print(f"the browser has disconnected: the simulation waits until one opens {self.url}")
 
 
-def _start(host: str, port: int, title: str) -> viser.ViserServer:
-    """A server on this port; viser alone would take the next free one."""
+def check_address(host: str, port: int) -> None:
+    """Raises AddressUnavailable if a server couldn't listen on a host and port now."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         socket.create_server((host, port), family=family).close()
@@ -151,6 +151,11 @@ def _start(host: str, port: int, title: str) -> viser.ViserServer:
         code = error.errno or 0  # negative where a name has no address
         why = os.strerror(code) if code > 0 else error.strerror
         raise AddressUnavailable(f"can't listen on port {port} of {host}: {why}") from None
+
+
+def _start(host: str, port: int, title: str) -> viser.ViserServer:
+    """A server on this port; viser alone would take the next free one."""
+    check_address(host, port)
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = viser.ViserServer(host, port, label=title, verbose=False)
     if port not in (0, server.get_port()):

@@ -3,7 +3,7 @@
 from typing import Any
 
 from rigid_envs.vector_env import RigidVectorEnv
-from rigid_envs.viewer.server import AddressUnavailable, ViewServer
+from rigid_envs.viewer.server import AddressUnavailable, ViewServer, check_address
 from rigid_envs.viewer.session import Session
 from training.policies.policy import Policy
 from training.settings.environments import make_vector_env
@@ -59,13 +59,14 @@ def serve(
 ) -> ViewServer:
     """The server of the page, which already listens; for arguments and errors see `view`."""
     arguments = {**(policy.env_kwargs if policy else {}), **env_kwargs}
-    envs = make_vector_env(env_id, num_worlds, **arguments).unwrapped
-    if not isinstance(envs, RigidVectorEnv):
-        raise UsageError(f"{env_id} cannot be viewed: it isn't an environment of rigid-envs")
-    session = Session(envs.runner, policy.act if policy else None, seed)
-    if policy:
-        policy.act(session.observation)  # raises an error if it is for other observations
     try:
+        check_address(host, port)  # at once, not after kernels have been compiled
+        envs = make_vector_env(env_id, num_worlds, **arguments).unwrapped
+        if not isinstance(envs, RigidVectorEnv):
+            raise UsageError(f"{env_id} cannot be viewed: it isn't an environment of rigid-envs")
+        session = Session(envs.runner, policy.act if policy else None, seed)
+        if policy:
+            policy.act(session.observation)  # raises an error if it is for other observations
         return ViewServer(session, host, port, env_id, seed)
     except AddressUnavailable as error:
         raise UsageError(f"{error}; choose another one with --port or --host") from error
