@@ -22,6 +22,7 @@ CUSTOM = "custom"
 NONE = "–"
 MOST_FRICTION = 2.0  # end of the slider
 SUBSTEPS = (0.1, 20.0)  # ms, ends of the slider
+COMPILES = "Changing the fidelity. The first use of a contact law compiles kernels, in 10 to 30 s."
 BRAND = (46, 150, 96)
 RUN, PAUSE, STEP, RESET = BUTTONS = ("Run", "Pause", "Step", "Reset")
 
@@ -153,7 +154,10 @@ class Controls:
 
         def preset(name: str) -> None:
             if name != CUSTOM:
+                self.say(COMPILES)
                 session.change_fidelity(name)
+                session.read()  # compiles, too
+                self.say("")
 
         def substep(value: float) -> None:
             session.change_fidelity(replace(session.fidelity, substep=1e-3 * value))

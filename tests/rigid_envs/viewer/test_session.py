@@ -231,6 +231,7 @@ def test_a_world_that_diverges_stops_the_session_until_a_reset():
     session.runner.world.set_state(linear_velocity=(1e200, 0.0, 0.0), worlds=one)
     session.step()
     assert "world 1" in session.error
+    assert np.isnan(session.read().step_time)  # the page still shows numbers
     session.step()
     assert session.steps == 0
     session.reset(0)
