@@ -17,7 +17,7 @@ help:
 # Installs again only when what is to be installed has changed.
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[train,render,mesh,dev,docs]"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[train,render,view,mesh,dev,docs]"
 	@touch $@
 
 .venv: $(STAMP)

@@ -106,6 +106,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         """The task."""
         return self._runner.task
 
+    @property
+    def runner(self) -> Runner:
+        """The runner that plays the episodes."""
+        return self._runner
+
     def reset(
         self,
         *,

@@ -3,6 +3,8 @@ import os
 import hypothesis
 import pytest
 
+from tests.browser import browser, browser_page  # noqa: F401  (fixtures of all tests)
+
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # two workers share two cores
 

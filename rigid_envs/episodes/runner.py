@@ -81,6 +81,7 @@ class Runner:
         scene = self.task.scene()
         self.randomization = Randomization(scene, count, randomize, self.task.size_range)
         ranges = self.randomization.check(randomize)
+        self._ranges = ranges
         per_world = self.randomization.needs_per_world_parameters(ranges)
         self.world = World(scene, fidelity, count, threads, per_world_parameters=per_world)
         if per_world:
@@ -166,11 +167,11 @@ class Runner:
         if self.observe_parameters:
             self.randomization.check_observed(ranges)
         if self.randomization.needs_per_world_parameters(ranges):
-            self._use_per_world_parameters()
+            self.use_per_world_parameters()
             self.randomization.check_step(self.world, ranges)
         self.randomization.set_ranges(mask, ranges)
 
-    def _use_per_world_parameters(self) -> None:
+    def use_per_world_parameters(self) -> None:
         """Replaces identical worlds by worlds with per-world parameters, in the same state.
 
         Running episodes continue bitwise identically.
@@ -182,6 +183,52 @@ class Runner:
             )
             parameters = Parameters.of(old.scene, self.count)
             self.world.restore(old.snapshot()._replace(parameters=parameters))
+
+    def change_ranges(self, randomize: Mapping[str, Any]) -> None:
+        """Replaces some of the constructor's ranges in all worlds, at once and from then on.
+
+        The running episodes continue with values drawn from the new ranges. Positions and
+        velocities stay; the contacts of worlds with per-world parameters start again.
+
+        Args:
+            randomize: ranges or numbers by name, see `Randomization`.
+
+        Raises:
+            TypeError, ValueError: invalid ranges, or ranges in which the time step would not be
+                stable. No state has changed then.
+        """
+        everyone = np.ones(self.count, dtype=bool)
+        self._randomize(everyone, {**self._ranges, **randomize})
+        self.randomization.draw(self.world, everyone, self._seeds, self._episodes)
+        self._now = self.world.read()
+
+    def change_fidelity(self, fidelity: str | Fidelity) -> None:
+        """Replaces the worlds by worlds of another fidelity, with the episodes that are running.
+
+        Positions, velocities, parameters and times stay. Contacts start again, so the first touch
+        of two solids that touch is now.
+
+        Args:
+            fidelity: name of a preset, or a physics.Fidelity.
+
+        Raises:
+            TypeError, ValueError: no such preset, or a fidelity with which the scene can't be
+                simulated. No state has changed then.
+        """
+        old, per_world = self.world, self.world.features.per_world_parameters
+        new = World(old.scene, fidelity, self.count, old.threads, per_world_parameters=per_world)
+        if per_world:
+            new.set_parameters(**old.parameters._asdict())
+        new.set_state(
+            position=old.position,
+            orientation=old.orientation,
+            linear_velocity=old.linear_velocity,
+            angular_velocity=old.angular_velocity,
+            drive_position=old.drive_position,
+            drive_velocity=old.drive_velocity,
+            time=old.time,
+        )
+        self.world, self._now = new, new.read()
 
     @property
     def seeded(self) -> bool:
@@ -370,7 +417,7 @@ class Runner:
             raise ValueError(f"state must have version {STATE_VERSION}, got {state['version']!r}")
         saved = state["world"]
         if isinstance(saved, Snapshot) and saved.parameters is not None:
-            self._use_per_world_parameters()
+            self.use_per_world_parameters()
         elif isinstance(saved, Snapshot) and self.world.features.per_world_parameters:
             saved = saved._replace(parameters=Parameters.of(saved.scene, len(saved.state.world)))
         self.world.restore(saved)

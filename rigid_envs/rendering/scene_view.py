@@ -1,6 +1,6 @@
 """What a world looks like: its solids, goal and contact forces as items that a renderer draws."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,34 +26,65 @@ FORCE_SCALE = 0.03
 THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
 
 
-def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item]:
-    """Bodies, drives and statics of one world, as particles if asked for; and grippers' arms."""
+class Solid(NamedTuple):
+    """A solid as the scene describes it.
+
+    Attributes:
+        shape: of the size that it has in its world.
+        position: [3] m.
+        orientation: [4] quaternion x, y, z, w.
+        color: red, green, blue in 0..255.
+        balls: what it touches with, if that is to be drawn.
+    """
+
+    shape: Any
+    position: Array
+    orientation: Array
+    color: Color
+    balls: Particles | None = None
+
+
+def solids(runner: "Runner", world: int, *, particles: bool = False) -> list[Solid]:
+    """Bodies, drives and statics of one world but the ground, and grippers' arms.
+
+    Args:
+        runner: whose worlds.
+        world: index of the world.
+        particles: whether to add what the solids touch with.
+    """
     engine, scene = runner.world, runner.world.scene
     sizes = np.ones(len(scene.bodies))
     if engine.features.per_world_parameters:
         sizes = engine.parameters.size[world]
-    found: list[Item] = []
+    found: list[Solid] = []
     for i, body in enumerate(scene.bodies):
         shape = body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i]))
         pose = engine.position[world, i], engine.orientation[world, i]
         balls = _particles(runner, i, body.shape) if particles else None
-        found += _solid(shape, *pose, BODY_COLORS[i % len(BODY_COLORS)], balls)
+        found.append(Solid(shape, *pose, BODY_COLORS[i % len(BODY_COLORS)], balls))
     tools, first = engine.drive_position[world], len(scene.bodies)
     for i, drive in enumerate(scene.driven_bodies):
         balls = _particles(runner, first + i, drive.shape) if particles else None
-        found += _solid(drive.shape, tools[i], np.array(drive.orientation), DRIVE_COLOR, balls)
+        turn = np.array(drive.orientation)
+        found.append(Solid(drive.shape, tools[i], turn, DRIVE_COLOR, balls))
     for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
             pose = np.array(static.position), np.array(static.orientation)
             solid = first + len(scene.driven_bodies) + i
             balls = _particles(runner, solid, static.shape) if particles else None
-            found += _solid(static.shape, *pose, STATIC_COLOR, balls)
+            found.append(Solid(static.shape, *pose, STATIC_COLOR, balls))
     for i, gripper in scene.grippers:
         found += _arm(gripper, tools[i], tools[i + 1])
     return found
 
 
-def _solid(
+def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item]:
+    """The solids of one world as items for the painter, as particles if asked for."""
+    drawn = solids(runner, world, particles=particles)
+    return [item for solid in drawn for item in _items(*solid)]
+
+
+def _items(
     shape: object, position: Array, orientation: Array, color: Color, balls: Particles | None
 ) -> list[Item]:
     """A solid as an item; a compound as one for each part, each with the balls nearest to it.
@@ -126,7 +157,7 @@ def _particles(runner: "Runner", solid: int, shape: object) -> Particles | None:
     return None if isinstance(shape, Sphere) or not len(positions) else Particles(positions, radius)
 
 
-def _arm(gripper: Gripper, near: Array, far: Array) -> list[Item]:
+def _arm(gripper: Gripper, near: Array, far: Array) -> list[Solid]:
     """Fingers that hang from a bar with a post: nothing solid, for a person to see a gripper."""
     pad = 0.5 * gripper.shape.width
     hand, up = 0.5 * (near + far), np.array([0.0, 0.0, 1.0])
@@ -136,4 +167,4 @@ def _arm(gripper: Gripper, near: Array, far: Array) -> list[Item]:
     parts = [(Box((THIN, THIN, length)), end + (pad + length) * up) for end in (near, far)]
     parts.append((Box((1.5 * THIN, half, BAR)), hand + ABOVE * up))
     parts.append((Box((1.5 * THIN, 1.5 * THIN, POST)), hand + (ABOVE + BAR + POST) * up))
-    return [Item(shape, position, UPRIGHT, ARM_COLOR) for shape, position in parts]
+    return [Solid(shape, position, UPRIGHT, ARM_COLOR) for shape, position in parts]

@@ -1,4 +1,4 @@
-"""The command line: `rigid-envs COMMAND`, as train, evaluate, record, results, play.
+"""The command line: `rigid-envs COMMAND`, as train, evaluate, record, results, play, view.
 
 It starts without Stable-Baselines3 or torch; a command that needs a missing package names the extra
 that installs it. Flags have the names of rl-baselines3-zoo where it has the same option.
@@ -110,6 +110,14 @@ def _parser() -> argparse.ArgumentParser:
         ("render", extras.RENDER_EXTRA),
     )
     flags.add_play(playing)
+
+    viewing = command(
+        "view",
+        handlers.view,
+        "Show many worlds side by side in a browser, with controls that act at once.",
+        ("view", extras.VIEW_EXTRA),
+    )
+    flags.add_view(viewing)
 
     scene = command(
         "scene", handlers.scene, "Run many bodies in one world and show its speed.", ("train", ())

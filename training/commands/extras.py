@@ -17,6 +17,7 @@ TRAIN_EXTRA = (
     "PIL",
 )
 RENDER_EXTRA = ("pygame",)
+VIEW_EXTRA = ("viser",)
 TUNE_EXTRA = (*TRAIN_EXTRA, "optuna")
 
 

@@ -196,6 +196,35 @@ def add_play(parser: argparse.ArgumentParser) -> None:
     add_environment(parser)
 
 
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """Flags of view."""
+    parser.add_argument(
+        "--env", help=f"environment id (default: that of the policy, or {DEFAULT_ENV})"
+    )
+    parser.add_argument(
+        "--policy",
+        metavar="POLICY",
+        help='run folder, .policy file or "scripted" (default: random actions)',
+    )
+    parser.add_argument(
+        "--num-worlds", type=count, default=16, help="number of worlds (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=whole, default=0, help="seed of the first world (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to listen on (default: %(default)s, which only this machine can reach)",
+    )
+    parser.add_argument(
+        "--port", type=port, default=8080, help="port to listen on (default: %(default)s)"
+    )
+    add_environment(parser)
+    # a model.zip is not accepted: it would have to be unpickled
+    parser.set_defaults(algo=None, device="cpu", stochastic=False, trust_pickle=False)
+
+
 def add_results(parser: argparse.ArgumentParser) -> None:
     """Flags of results."""
     parser.add_argument(
@@ -311,6 +340,14 @@ def count(text: str) -> int:
 def whole(text: str) -> int:
     """Parses an integer of at least 0."""
     return _integer(text, 0)
+
+
+def port(text: str) -> int:
+    """Parses a port: an integer from 0, for a free one, to 65535."""
+    value = _integer(text, 0)
+    if value > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} should be a port, at most 65535")
+    return value
 
 
 def positive(text: str) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from training.commands.extras import require
+from training.commands.flags import DEFAULT_ENV
 from training.commands.options import (
     check_resumable,
     config_of,
@@ -139,6 +140,28 @@ def play(options: argparse.Namespace) -> int:
         require("train", ("yaml",))
         arguments = {**env_kwargs_of(options), **arguments}
     game.play(options.env, seed=options.seed, **arguments)
+    return 0
+
+
+def view(options: argparse.Namespace) -> int:
+    """Serves a page that shows many worlds."""
+    arguments = {} if options.fidelity is None else {"fidelity": options.fidelity}
+    if options.policy is not None or options.env_kwargs:
+        require("train", ("yaml",))
+        arguments = env_kwargs_of(options)
+    policy = policy_of(options) if options.policy is not None else None
+
+    from training.commands import view as viewer
+
+    viewer.view(
+        options.env or (policy.env_id if policy else DEFAULT_ENV),
+        policy,
+        num_worlds=options.num_worlds,
+        seed=options.seed,
+        host=options.host,
+        port=options.port,
+        **arguments,
+    )
     return 0
 
 

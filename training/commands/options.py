@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 RESERVED = {
     "seed": "use --seed",
     "episodes": "use --n-episodes",
-    "num_envs": "use --n-envs, which only train has",
+    "num_envs": "use --n-envs of train or --num-worlds of view",
     "env_id": "use --env, or for play the first argument",
     "render_mode": "the command sets it",
     "autoreset_mode": "the command sets it",

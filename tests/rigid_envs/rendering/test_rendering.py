@@ -27,7 +27,7 @@ from rigid_envs.rendering.renderer import (
     Renderer,
     grid,
 )
-from rigid_envs.rendering.scene_view import _solid
+from rigid_envs.rendering.scene_view import _items
 from rigid_envs.rendering.solids import Solids
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -161,13 +161,13 @@ def test_a_cylinder_has_a_shadow_as_round_as_itself():
 
 def test_a_torus_is_a_ring_with_a_hole_and_particles_are_balls():
     at = np.array((0.0, 0.0, 0.02))
-    (ring,) = _solid(Torus(0.05, 0.015), at, np.array(UPRIGHT), RED, None)
+    (ring,) = _items(Torus(0.05, 0.015), at, np.array(UPRIGHT), RED, None)
     frame = draw(ring)
     assert not shows(frame, pixel_of((0.0, 0.0, 0.0)), RED)
     for angle in np.arange(8) * np.pi / 4:
         assert shows(frame, pixel_of((0.05 * np.cos(angle), 0.05 * np.sin(angle), 0.03)), RED)
     pair = ParticleShape([(-0.05, 0.0, 0.0), (0.05, 0.0, 0.0)], 0.02)
-    (balls,) = _solid(pair, at, np.array(UPRIGHT), RED, None)
+    (balls,) = _items(pair, at, np.array(UPRIGHT), RED, None)
     np.testing.assert_array_equal(balls.particles.positions, pair.points)
     np.testing.assert_allclose(balls.shape.half_extents, (0.07, 0.02, 0.02))
 
