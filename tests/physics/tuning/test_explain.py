@@ -1,0 +1,67 @@
+"""explain says what is modelled and left out, and its numbers are those of the engine."""
+
+import re
+
+import pytest
+
+from physics import PRESETS, Attractor, Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
+from physics.reference.scenes import block_on_ground, tower
+
+CUBE = block_on_ground(mass=0.1)
+
+
+def section(text, title):
+    """The lines under a title."""
+    return re.search(rf"^{title}[^\n]*\n((?:  [^\n]*\n?)*)", text, re.MULTILINE)[1]
+
+
+def test_the_sink_at_rest_is_the_one_that_a_world_has():
+    for name in PRESETS:
+        text = PRESETS[name].explain(CUBE, costs=False)
+        sink = float(re.search(r"Ground.* ([\d.e-]+) mm", section(text, "Contacts"))[1])
+        world = World(CUBE, name)
+        world.advance(1.0)
+        assert sink == pytest.approx(1e3 * (0.02 - world.position[0, 0, 2]), rel=0.02)
+
+
+def test_it_names_what_is_modelled_and_what_is_left_out():
+    text = Fidelity(friction="viscous", damping="dashpot").explain(CUBE, costs=False)
+    assert "linear dashpots" in section(text, "Models")
+    assert "bodies at rest on slopes creep" in section(text, "Leaves out")
+    assert "moment of first contact" in section(text, "Leaves out")
+    smooth = block_on_ground(friction=0.0)
+    assert "friction: every pair has the coefficient 0" in Fidelity().explain(smooth, costs=False)
+    orbit = Scene([Body(Sphere(0.05), mass=1.0)], fields=[Attractor((1, 0, 0), 1.0)])
+    text = Fidelity(integrator="rk4").explain(orbit, costs=False)
+    assert "nothing can touch" in section(text, "Leaves out")
+    assert "Attractor" in section(text, "Models")
+    assert "Contacts" not in text
+
+
+def test_it_says_when_a_world_would_refuse():
+    text = Fidelity(integrator="rk4").explain(CUBE, costs=False)
+    assert "a World refuses it: Fidelity.integrator 'rk4'" in text
+    stiff = Material(0.5, 0.0, stiffness=1e8)
+    scene = Scene([Body(Box((0.02, 0.02, 0.02)), mass=0.1, material=stiff)], [Ground(stiff)])
+    assert "a World refuses it: Material.stiffness" in Fidelity().explain(scene, costs=False)
+
+
+def test_the_speed_that_passes_through_is_half_a_width_per_substep():
+    text = Fidelity(substep=1e-3).explain(CUBE, costs=False)
+    assert "faster than 20 m/s can pass through the thinnest solid, 40 mm" in text
+    swept = Fidelity(law="impulse", contact_resolution=1.8, time_control="swept")
+    assert "pass through" not in swept.explain(CUBE, costs=False)
+
+
+def test_costs_add_up_to_the_whole():
+    text = section(Fidelity().explain(CUBE), "Cost")
+    costs = {line.split("  ")[1].strip(): float(re.search(r"([\d,]+) ns", line)[1].replace(",", ""))
+             for line in text.splitlines()}  # fmt: skip
+    assert list(costs) == ["motion of bodies", "contacts", "friction", "all"]
+    assert costs["all"] == pytest.approx(sum(list(costs.values())[:-1]), abs=3)
+    assert costs["contacts"] > 0.0
+
+
+def test_many_bodies_are_listed_by_kind():
+    text = Fidelity().explain(tower(100), costs=False)
+    assert len(section(text, "Contacts").splitlines()) == 4
