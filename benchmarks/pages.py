@@ -12,14 +12,15 @@ from collections.abc import Iterator
 from benchmarks.report.provenance import ROOT, describe
 from benchmarks.report.results_file import RESULTS, Saved, load
 from benchmarks.report.summary import summary
-from benchmarks.report.tables import Table, markdown
+from benchmarks.report.tables import Cell, Table, markdown
 from benchmarks.trade import page as trade_page
 from benchmarks.trade import store
 from benchmarks.trade.measure import TRIALS
+from physics.reference.promises import PROMISES
 
 PAGES = (ROOT / "README.md", ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "trade.md")
 RUNS = "runs"  # in place of a table: what the tables of the page were measured on
-SUMMARY = "summary"
+SUMMARY, TRIALS_TABLE, PROMISES_TABLE = "summary", "trials", "promises"
 _BLOCK = re.compile(r"(<!-- figures: ([^>]*?) -->\n).*?(<!-- /figures -->)", re.DOTALL)
 
 
@@ -49,6 +50,10 @@ def _names(found: re.Match[str]) -> list[str]:
 def _table(saved: Saved, name: str) -> Table:
     if name == SUMMARY:
         return summary(saved)
+    if name == TRIALS_TABLE:
+        return trials_table()
+    if name == PROMISES_TABLE:
+        return promises_table()
     if name not in saved.tables:
         raise SystemExit(f"table {name!r} is not saved: run python -m benchmarks --save")
     # targets matter to those who change the code, not to the readers of a page
@@ -56,6 +61,23 @@ def _table(saved: Saved, name: str) -> Table:
     if "target" in table.columns:
         table = table.without("target")
     return table._replace(rows=[row for row in table.rows if row[0] != "target"])
+
+
+def trials_table() -> Table:
+    """The scenes of the trade and what their errors are."""
+    rows: list[list[Cell]] = [[t.name, t.title, t.error_of] for t in TRIALS.values()]
+    return Table(TRIALS_TABLE, "Scenes", ["scene", "what happens", "error"], rows)
+
+
+def promises_table() -> Table:
+    """What each preset holds."""
+    rows: list[list[Cell]] = [
+        [name, float(p.cubes), 1e3 * p.sink, p.slide, p.restitution, p.creep]
+        for name, p in PROMISES.items()
+    ]
+    columns = ["preset", "cubes that stand for 10 s", "sink at rest, mm", "error of a slide"]
+    columns += ["error of restitution, ball", "creep on 20°, m/s"]
+    return Table(PROMISES_TABLE, "At most, for cubes of 4 cm", columns, rows)
 
 
 def _titled(table: Table) -> str:
@@ -105,7 +127,7 @@ def run() -> None:
 
 
 def trade_text(saved: Saved) -> str:
-    """The page docs/trade/index.html of the measured trade."""
+    """The page docs/trade/compare.html of the measured trade."""
     run = describe(saved.runs["trade many"]).replace("\n", "; ")
     return trade_page.page(store.load(), TRIALS, run)
 

@@ -1,4 +1,4 @@
-"""docs/trade/index.html: one self-contained page on which a reader compares settings."""
+"""docs/trade/compare.html: one self-contained page on which a reader compares settings."""
 
 import json
 import math
@@ -10,7 +10,7 @@ from benchmarks.report.provenance import ROOT
 from benchmarks.trade.store import Row
 from benchmarks.trade.trial import Trial
 
-PATH = ROOT / "docs" / "trade" / "index.html"
+PATH = ROOT / "docs" / "trade" / "compare.html"
 TEMPLATE = Path(__file__).with_name("page.html")
 _DATA, _END = "/*data*/", "/*end of data*/"
 
