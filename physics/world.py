@@ -532,7 +532,10 @@ class World:
         return energies.potential_energy(self._simulation)
 
     def elastic_energy(self) -> Array:
-        """[count] J stored in the normal springs of contacts now; zero with the impulse law.
+        """[count] J stored in the normal springs of contacts now.
+
+        With the impulse law that of overlaps at rest; what an instantaneous collision leaves of an
+        overlap has stored nothing.
 
         Springs of friction are not counted: while a contact slides, their force has no potential.
 
