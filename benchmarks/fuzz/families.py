@@ -19,6 +19,7 @@ class Family(NamedTuple):
         joint: class of a joint between the first two bodies, or "".
         smooth: without friction.
         resists: with rolling and spinning resistance.
+        tilted: gravity in any direction; otherwise downwards.
         fidelity: fields of Fidelity that the kernel depends on.
     """
 
@@ -30,6 +31,7 @@ class Family(NamedTuple):
     joint: str = ""
     smooth: bool = False
     resists: bool = False
+    tilted: bool = False
     fidelity: dict[str, Any] = {}
 
 
@@ -41,6 +43,8 @@ FAMILIES: tuple[Family, ...] = (
     Family("smooth balls", ("ball", "ball", "ball"), smooth=True),
     Family("balls", ("ball",) * 6),
     Family("one box", ("box",)),
+    Family("one box, tilted", ("box",), tilted=True),
+    Family("boxes, tilted", ("box", "box"), statics=("ground", "box"), tilted=True),
     Family("boxes", ("box", "box", "box")),
     Family("boxes, impulses", ("box", "box", "box"), fidelity=IMPULSE),
     Family("boxes, dashpot", ("box", "box"), fidelity={"damping": "dashpot"}),

@@ -115,7 +115,7 @@ def draw_scene(family: Family, number: int) -> Drawn:
             statics.append(Static(solid, (0.0, 0.0, -scale), material=_material(draw, family)))
     scene = Scene(
         bodies, statics, [_drive(draw, drive, scale, family) for drive in family.drives],
-        (0.0, 0.0, -gravity) if draw.chance(0.5) else draw.vector(gravity),
+        draw.vector(gravity) if family.tilted else (0.0, 0.0, -gravity),
         [_field(draw, field, scale) for field in family.fields], _joints(draw, family, bodies),
     )  # fmt: skip
     return Drawn(scene, _fidelity(draw, family, min(sizes), gravity))
