@@ -42,6 +42,9 @@ def outcome_of(family: Family, number: int) -> Outcome:
         if FIELD.search(str(error)):
             return Outcome(REFUSED, str(error))
         return Outcome(FINDING, f"a message that names no field: {error}")
+    except MemoryError as error:  # says what is needed and what is free
+        known = "memory are free" in str(error)
+        return Outcome(REFUSED if known else FINDING, str(error))
     except Exception as error:
         return Outcome(FINDING, f"{type(error).__name__} at construction: {error}")
     try:

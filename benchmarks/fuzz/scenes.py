@@ -1,7 +1,7 @@
 """Draws the values of a scene: sizes, masses, poses, speeds, materials, gravity, fidelity.
 
-What spans decades is uniform in its logarithm. Most scenes have one scale of length, of which their
-solids are a part or a multiple; in the others each solid has its own, which is mostly refused. The
+What spans decades is uniform in its logarithm. A scene has one scale of length, of which its solids
+are a part or a multiple: a large ratio of sizes asks for more samples than fit into memory. The
 step is drawn about the time in which a body falls by its own size, so that part of the scenes run.
 """
 
@@ -35,7 +35,9 @@ from physics import (
 Vector = tuple[float, float, float]
 
 SIZES, MASSES, SPEEDS, GRAVITY = (1e-4, 1e2), (1e-6, 1e6), (1e-3, 1e4), (1e-3, 1e3)
-OWN_SCALE = 0.15  # probability that each solid has its own scale of length
+OWN_SCALE = 0.15  # probability that solids differ up to OTHERS times in size, not LIKE times
+# A box has samples as close as the smallest solid is wide: with 100 times its size, 10^6 of them
+LIKE, OTHERS = 3.0, 8.0
 MOVES, SPINS, OVERLAPS, OWN_MASS = 0.6, 0.5, 0.3, 0.5  # probabilities
 
 
@@ -84,12 +86,10 @@ def draw_scene(family: Family, number: int) -> Drawn:
         TypeError, ValueError: the values that were drawn are refused.
     """
     draw = Draw(number)
-    scale, own_scale = draw.power(*SIZES), draw.chance(OWN_SCALE)
+    scale, ratio = draw.power(*SIZES), OTHERS if draw.chance(OWN_SCALE) else LIKE
     gravity = draw.power(*GRAVITY)
     mass, speed = draw.power(*MASSES), draw.power(*SPEEDS)
-    sizes = [
-        draw.power(*SIZES) if own_scale else scale * draw.power(0.3, 3.0) for _ in family.shapes
-    ]
+    sizes = [scale * draw.power(1.0 / ratio, ratio) for _ in family.shapes]
     bodies, height = [], 0.0
     overlaps = draw.chance(OVERLAPS)
     for shape, size in zip(family.shapes, sizes, strict=True):
