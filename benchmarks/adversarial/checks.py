@@ -26,9 +26,16 @@ def not_finite(values: Mapping[str, Array]) -> dict[int, str]:
     return found
 
 
-def out_of_world(world: World) -> Array:
+def below_ground(world: World) -> Array:
     """[count] bool: the centre of a body is below the ground."""
     return np.asarray((world.position[..., 2] < 0.0).any(axis=1))
+
+
+def out_of_world(world: World) -> Array:
+    """[count] bool: all of a body is below the ground."""
+    reach = np.array([body.shape.reach for body in world.scene.bodies])
+    sizes = world.parameters.size if world.features.per_world_parameters else 1.0
+    return np.asarray((world.position[..., 2] < -reach * sizes).any(axis=1))
 
 
 def sunk(world: World, mask: Array) -> dict[int, str]:

@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.adversarial.actions import ACTIONS
 from benchmarks.adversarial.balance import Balance
 from benchmarks.adversarial.checks import (
+    below_ground,
     differences,
     gained,
     not_finite,
@@ -27,6 +28,7 @@ Array = np.ndarray
 ALONE = 96  # worlds that are advanced a second time
 LOOK = 150  # steps between two measurements of penetration
 SAVED = 3  # failures of each kind that are saved
+KINDS = ("not_finite", "sank", "escaped", "gained", "different")
 
 
 class Combination(NamedTuple):
@@ -52,7 +54,8 @@ class Figures(NamedTuple):
         steps: environment steps.
         episodes: episodes that began.
         not_finite: episodes that diverged or returned a number that is not finite.
-        escaped: episodes in which a body left the world.
+        sank: episodes in which the centre of a body was below the ground.
+        escaped: episodes in which all of a body was.
         gained: episodes in which a world gained energy.
         different: steps in which all worlds and a few by themselves were not bitwise equal.
         lowest: m, the lowest centre of a body.
@@ -66,6 +69,7 @@ class Figures(NamedTuple):
     steps: float
     episodes: float
     not_finite: float
+    sank: float
     escaped: float
     gained: float
     different: float
@@ -104,10 +108,10 @@ class Run:
         self._balance = Balance(self.runner.world)
         self._ended = np.zeros(worlds, dtype=bool)
         # kind of failure that the episode of each world has already counted
-        self._counted = {name: np.zeros(worlds, dtype=bool) for name in ("escaped", "gained")}
+        self._counted = {name: np.zeros(worlds, dtype=bool) for name in KINDS[1:4]}
         steps = self.runner.max_episode_steps or self.runner.task.max_episode_steps
         self._actions: deque[Array] = deque(maxlen=steps)
-        self._counts = dict.fromkeys(("not_finite", "escaped", "gained", "different"), 0)
+        self._counts = dict.fromkeys(KINDS, 0)
         self._saved = dict(self._counts)
         self._episodes, self._steps, self._spent = worlds, 0, 0.0
         self._lowest, self._deepest, self._fastest = np.inf, 0.0, 0.0
@@ -164,10 +168,12 @@ class Run:
         world = self.runner.world
         for counted in self._counted.values():
             counted &= ~began
-        out = out_of_world(world) & ~self._counted["escaped"]
-        if out.any():
-            self._counted["escaped"] |= out
-            self._note("escaped", sunk(world, out))
+        below = below_ground(world)
+        if below.any():
+            for kind, mask in (("sank", below), ("escaped", below & out_of_world(world))):
+                new = mask & ~self._counted[kind]
+                self._counted[kind] |= new
+                self._note(kind, sunk(world, new))
         balance = self._balance
         balance.update(world, began)
         ratio = balance.gain / balance.allowed

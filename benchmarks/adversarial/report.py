@@ -13,7 +13,7 @@ Results = dict[Key, Figures]
 HEADER = [*Combination._fields, "chunk", *Figures._fields]
 COLUMNS = [
     "task", "preset", "actions", "parameters", "million steps", "million episodes", "not finite",
-    "escaped", "gained energy", "not bitwise", "lowest centre m", "deepest penetration m",
+    "sank", "escaped", "gained energy", "not bitwise", "lowest centre m", "deepest penetration m",
     "fastest m/s", "largest gain mJ", "gain over allowed", "s",
 ]  # fmt: skip
 
@@ -74,7 +74,8 @@ def table(results: Results) -> Table:
 
 def _cells(figures: Figures) -> list[Cell]:
     return [
-        figures.steps / 1e6, figures.episodes / 1e6, figures.not_finite, figures.escaped,
+        figures.steps / 1e6, figures.episodes / 1e6, figures.not_finite, figures.sank,
+        figures.escaped,
         figures.gained, figures.different, figures.lowest, figures.deepest, figures.fastest,
         1e3 * figures.gain, figures.gain_ratio, figures.seconds,
     ]  # fmt: skip
