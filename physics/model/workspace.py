@@ -50,7 +50,6 @@ SOLID = np.dtype(
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
         ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
-        ("touching", "f8", (LANES,)),  # solids that it touched in the last step; of springs
     ],
     align=True,
 )

@@ -121,7 +121,7 @@ def make_keep_memory(features):
 @cached_by_features
 def make_begin_half_pair(features):
     """Stage that prepares the sums of a half-pair, and what its loop reads of the last step."""
-    compound, dashpot = features.compound, features.dashpot
+    compound = features.compound
 
     @stage
     def begin_half_pair(model, workspace, k, h, relative):
@@ -133,8 +133,7 @@ def make_begin_half_pair(features):
 
         Also corrects the damping coefficient for (omega h)^2 W, see model/normal_damping.py.
 
-        m is the pair mass, divided by the number of solids that one of the two touches, the larger
-        number; and h the step. W is the sum of the weights of the samples that were in
+        m is the pair mass and h the step. W is the sum of the weights of the samples that were in
         contact in the last step, over all half-pairs of the pair, and F their normal force. The
         results are zero where nothing was in contact. All of it is written to `relative`, one
         array, because LLVM checks before every run of the loop that its arrays don't overlap.
@@ -144,10 +143,6 @@ def make_begin_half_pair(features):
         other = workspace.half_pair[max(half_pair.reverse, 0)]
         pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
         damping, errors = half_pair.damping, half_pair.damping_error
-        own, others = (
-            workspace.solid[half_pair.owner].touching,
-            workspace.solid[half_pair.surface].touching,
-        )
         if compound:
             sum_of_pair(
                 model, workspace, k,
@@ -156,10 +151,8 @@ def make_begin_half_pair(features):
             )  # fmt: skip
         for i in range(LANES):
             mass, spring = at(pair_mass, i), at(stiffness, i)
-            # the dashpot has no load, and its damping depends on the mass
-            parts = 1.0 if dashpot else max(1.0, max(own[i], others[i]))
-            rate = mass / (parts * h) if h > 0.0 else 0.0
-            relative.inverse_mass[i] = parts / mass
+            rate = mass / h if h > 0.0 else 0.0
+            relative.inverse_mass[i] = 1.0 / mass
             relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)
             if compound:  # until the loop these four fields are scratch, cleared below
                 weight, force = relative.current_weight[i], relative.normal_force_sum[i]
@@ -187,33 +180,6 @@ def make_begin_half_pair(features):
             relative.closing_sum[i] = 0.0
 
     return begin_half_pair
-
-
-@stage
-def count_touching(model, workspace):
-    """Counts the solids that each dynamic body touched in the last step."""
-    for m in range(model.dynamic.shape[0]):
-        touching = workspace.solid[m].touching
-        for i in range(LANES):
-            touching[i] = 0.0
-    weight = workspace.relative[0].current_weight  # free until a half-pair begins
-    for k in range(model.half_pair.shape[0]):
-        previous = workspace.half_pair[k].previous_weight
-        for i in range(LANES):
-            weight[i] = previous[i]
-        first, other = True, model.half_pair[k].next_in_pair
-        while other != k:
-            first = first and other > k
-            previous = workspace.half_pair[other].previous_weight
-            for i in range(LANES):
-                weight[i] += previous[i]
-            other = model.half_pair[other].next_in_pair
-        if first:  # each pair once
-            for solid in (model.half_pair[k].owner, model.half_pair[k].surface):
-                if solid < model.dynamic.shape[0]:
-                    touching = workspace.solid[solid].touching
-                    for i in range(LANES):
-                        touching[i] += 1.0 if weight[i] > 0.0 else 0.0
 
 
 @stage
@@ -266,13 +232,11 @@ def make_contacts(features):
     `elapsed` is the time in s since `advance` began. It takes the arguments of the impulse law,
     which alone needs `drifted`, the time in s that the last drift took.
     """
-    half_pair, dashpot = make_half_pair(features, False), features.dashpot
+    half_pair = make_half_pair(features, False)
 
     @sequence
     def contacts(model, state, workspace, g, h, drifted, elapsed):
         find_waiting(workspace.lane[0])
-        if not dashpot:
-            count_touching(model, workspace)
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:

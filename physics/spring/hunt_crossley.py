@@ -16,7 +16,7 @@ approach takes over their ratio v/d', the mean with the forces as weights, but n
 mean v. Where all of them move alike this is their v; one that comes slowly from another side, as a
 wall does that a body on the floor touches, keeps its own.
 
-In discrete time the law needs three details.
+In discrete time the law needs two details.
 
 1. The rate relaxes within the step. Let u be the rate at which it starts, c = k d a / v,
    x = c h / m, and L the load that presses the contact from outside. Then m u' = L - k d - c u has
@@ -45,12 +45,6 @@ In discrete time the law needs three details.
    the penetration moves by b = h |u| / 2 either way. Where it crosses zero, the mean of max(0, d)
    is (d + b)^2 / (4 b). So restitution does not depend on the phase of the step at first touch
    (docs/decisions/0007-normal-force.md).
-
-3. Where a body touches n solids at once, each contact relaxes as if it were alone, and strong ones
-   remove up to n times the approach speed. (A cube that a gripper squeezed against the ground
-   vibrated at every step and gained energy.) So each contact gets the n-th part of the mass in x
-   and in the change of L (mass splitting, Tonge, Benevolenski and Voroshilov 2012): together they
-   remove at most the whole speed. Of two bodies the larger n counts.
 
 The impact speed is reset whenever a contact turns from separating to approaching, so that a body
 that has landed is damped by its present motion. `floor` is its least value.
@@ -95,11 +89,11 @@ def hunt_crossley_force(
         k: N/m.
         a: damping coefficient.
         floor: m/s, lower bound of the impact speed.
-        inverse_mass: 1/kg, n times the inverse of the pair mass; for an owner with a single sample,
-            that of the effective mass at its contact point, to which rotation contributes.
+        inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
+            of the effective mass at its contact point, to which rotation contributes.
         speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
         h: s.
-        load_rate: kg/s, m / (n W h).
+        load_rate: kg/s, m / (W h).
         inverse_mean_force: 1/N, W / F of the last step, 0 where nothing was in contact.
         mean_impact_speed: m/s, of the pair in the last step; samples that separated count as 0.
         impact_ratio: of impact speed to rate of the samples that approached in the last step.
