@@ -79,6 +79,8 @@ def _difference(simulation: Simulation, saved: Snapshot) -> str:
         return "scene"
     if any(a.dtype != b.dtype for a, b in zip(saved.state, simulation.state, strict=True)):
         return "version: its arrays have other fields"
+    if saved.state.servo.shape != simulation.state.servo.shape:
+        return f"measure_work: {saved.state.servo.size > 0}"
     if (saved.parameters is not None) != simulation.features.per_world_parameters:
         return f"per_world_parameters: {saved.parameters is not None}"
     return ""

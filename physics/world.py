@@ -15,6 +15,7 @@ from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
 from physics.analysis.step_limits import check_step
+from physics.analysis.work_limits import check_work
 from physics.granular.queries import GranularQueries
 from physics.granular.simulation import GranularSimulation
 from physics.granular.support import supports
@@ -48,12 +49,15 @@ class World:
         allow_unstable: accept a scene for which the fidelity's substep is too long.
         per_world_parameters: masses, friction, restitution and sizes may differ between worlds, see
             `set_parameters`. Identical worlds are faster.
+        measure_work: sum up the work of the drives' servos, see `drive_work`. For worlds side by
+            side with equal steps.
 
     Raises:
         TypeError: an argument of the wrong type.
         ValueError: an argument out of range; a substep that is too long for the scene, see
             `physics.analysis.step_limits.check_step`; an integrator that can't advance it, see
-            `physics.analysis.integrator_limits.check_integrator`.
+            `physics.analysis.integrator_limits.check_integrator`; `measure_work` where it is not
+            supported.
     """
 
     def __init__(
@@ -65,6 +69,7 @@ class World:
         *,
         allow_unstable: bool = False,
         per_world_parameters: bool = False,
+        measure_work: bool = False,
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene: Scene = instance("scene", scene, Scene)
@@ -72,26 +77,28 @@ class World:
         self.count = integer("count", count, low=1)
         self.threads = check_threads(threads)
         per_world_parameters = instance("per_world_parameters", per_world_parameters, bool)
+        measure_work = instance("measure_work", measure_work, bool)
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
         arguments = scene, self.fidelity, self.count, self.threads, per_world_parameters
         self._simulation: Simulation
         self._queries: LaneQueries | CrowdQueries | GranularQueries
-        if is_crowd(scene, self.fidelity, per_world_parameters) and not supports(
-            scene, self.fidelity
-        ):
+        crowd = is_crowd(scene, self.fidelity, per_world_parameters)
+        if measure_work:
+            check_work(scene, self.fidelity, crowd)
+        if crowd and not supports(scene, self.fidelity):
             heap = GranularSimulation(*arguments[:-1])
             self._simulation, self._queries = heap, GranularQueries(heap)
             if not allow_unstable:
                 check_crowd(scene, self.fidelity, heap.classes())
-        elif is_crowd(scene, self.fidelity, per_world_parameters):
-            crowd = CrowdSimulation(*arguments)
-            self._simulation, self._queries = crowd, CrowdQueries(crowd)
-            check_integrator(scene, self.fidelity, crowd.base)
+        elif crowd:
+            many = CrowdSimulation(*arguments)
+            self._simulation, self._queries = many, CrowdQueries(many)
+            check_integrator(scene, self.fidelity, many.base)
             if not allow_unstable:
-                check_crowd(scene, self.fidelity, crowd.kinds.of_solid, crowd.mechanisms.checked)
-                check_impacts(scene, self.fidelity, crowd.kinds)
+                check_crowd(scene, self.fidelity, many.kinds.of_solid, many.mechanisms.checked)
+                check_impacts(scene, self.fidelity, many.kinds)
         else:
-            self._simulation = Simulation(*arguments)
+            self._simulation = Simulation(*arguments, measure_work)
             self._queries = LaneQueries(self._simulation)
             check_integrator(scene, self.fidelity, self._simulation.base)
             if not allow_unstable:
@@ -523,6 +530,35 @@ class World:
         position; for an exponent of 1 it is strength * mass * ln(r / 1 m).
         """
         return energies.potential_energy(self._simulation)
+
+    def elastic_energy(self) -> Array:
+        """[count] J stored in the normal springs of contacts now.
+
+        With the impulse law that of overlaps at rest; what an instantaneous collision leaves of an
+        overlap has stored nothing.
+
+        Springs of friction are not counted: while a contact slides, their force has no potential.
+
+        Raises:
+            ValueError: a world of many bodies.
+        """
+        self._refresh()
+        return self._queries.elastic_energy()
+
+    def drive_energy(self) -> Array:
+        """[count, drives] J, kinetic energy of each drive."""
+        return energies.drive_energy(self._simulation)
+
+    def drive_work(self) -> Array:
+        """[count, drives] J, work of each drive's servo since the state was set or reset.
+
+        The sum over the kicks of the integrator, exact to round-off: energy of bodies, drives and
+        contacts rises by no more. A gripper's work is the sum of those of its fingers.
+
+        Raises:
+            ValueError: the World was built without `measure_work`.
+        """
+        return energies.drive_work(self._simulation)
 
     def linear_momentum(self) -> Array:
         """[count, 3] kg m/s of the bodies."""

@@ -97,6 +97,7 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
         pace=state.pace[worlds] if state.pace.size else state.pace,
         place=lanes,
         resident=resident,
+        servo=state.servo[worlds] if state.servo.size else state.servo,
     )
     rows = np.zeros(state.candidate.shape[1], REPORT)
     everyone = np.ones(len(copied.world), dtype=bool)

@@ -27,6 +27,24 @@ def potential_energy(simulation: Simulation) -> Array:
     return field_energy(simulation) - np.einsum(axes, position, weight)
 
 
+def drive_energy(simulation: Simulation) -> Array:
+    """[count, drives] J, kinetic energy of each drive."""
+    momentum = simulation.state.dynamic["momentum"][:, simulation.bodies :]
+    inverse = simulation.base.dynamic["inverse_mass"][simulation.bodies :]
+    return np.asarray(0.5 * inverse * np.sum(momentum**2, axis=-1))
+
+
+def drive_work(simulation: Simulation) -> Array:
+    """[count, drives] J, work of each drive's servo since the state was set.
+
+    Raises:
+        ValueError: it is not measured.
+    """
+    if not simulation.features.measures_work:
+        raise ValueError("drive_work needs a World that is built with measure_work=True")
+    return np.asarray(simulation.state.servo["work"][:, simulation.bodies :].copy())
+
+
 def linear_momentum(simulation: Simulation) -> Array:
     """[count, 3] kg m/s of the bodies."""
     return np.asarray(simulation.state.dynamic["momentum"][:, : simulation.bodies].sum(axis=1))

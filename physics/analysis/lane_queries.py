@@ -3,6 +3,7 @@
 import numpy as np
 
 from physics.analysis import diagnostics, stability
+from physics.analysis.contact_energy import elastic_energy
 from physics.analysis.diagnostics import Contacts
 from physics.step.simulation import Simulation
 
@@ -21,6 +22,10 @@ class LaneQueries:
         """[count] m, deepest penetration now; 0 where nothing touches."""
         simulation = self._simulation
         return diagnostics.penetration(simulation.model, simulation.features, simulation.state)
+
+    def elastic_energy(self) -> Array:
+        """[count] J stored in the springs of contacts now."""
+        return elastic_energy(self._simulation)
 
     def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
         """The touching points of one world, whose solids have these names."""

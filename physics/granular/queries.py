@@ -22,6 +22,17 @@ class GranularQueries:
         """[count] m, deepest penetration now; 0 where nothing touches."""
         return self._simulation.penetration()
 
+    def elastic_energy(self) -> Array:
+        """Not computed here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(
+            "elastic_energy is computed in worlds side by side only, got a world of "
+            f"{self._simulation.bodies} bodies"
+        )
+
     def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
         """The touching points of one world, whose solids have these names."""
         return self._simulation.contacts(world)

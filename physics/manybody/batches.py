@@ -64,6 +64,7 @@ def workspace_of(workspace, pairs, kind, b, rows, first_row, row_count):
         pairs.timing[first : first + kind.half_pair_count],
         workspace.clock,
         workspace.kept,
+        workspace.servo,
     )
 
 
@@ -83,6 +84,7 @@ def state_of(state, pairs, kind, b):
         state.pace,
         state.place,
         state.resident,
+        state.servo,
     )
 
 

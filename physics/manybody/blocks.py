@@ -74,6 +74,7 @@ def group_workspace(workspace, crowd, g):
         workspace.timing,
         workspace.clock,
         crowd.kept[:, group.first_block : group.first_block + group.solid_count],
+        workspace.servo,
     )
 
 
@@ -92,6 +93,7 @@ def group_state(state, crowd, g):
         state.pace,
         state.place,
         state.resident,
+        state.servo,
     )
 
 

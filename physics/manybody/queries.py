@@ -60,6 +60,17 @@ class CrowdQueries:
         ]
         return np.array(deepest)
 
+    def elastic_energy(self) -> Array:
+        """Not computed here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(
+            "elastic_energy is computed in worlds side by side only, got a world of "
+            f"{self._simulation.bodies} bodies"
+        )
+
     def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
         """The touching points of one world, whose solids have these names."""
         found = self._touching(world)

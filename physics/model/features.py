@@ -44,6 +44,7 @@ class Features(NamedTuple):
         compound: at least one surface is a part of a compound and has its own frame.
         per_world_parameters: masses, materials and sizes can differ between worlds.
         time_control: FIXED, HALVED, BISECTION, ADVANCEMENT or SWEPT.
+        measures_work: the work of the servos is summed up, see `World.drive_work`.
     """
 
     integrator: int
@@ -74,6 +75,7 @@ class Features(NamedTuple):
     compound: bool
     per_world_parameters: bool
     time_control: int = FIXED
+    measures_work: bool = False
 
     @property
     def finds_impacts(self) -> bool:

@@ -63,6 +63,15 @@ STATUS = np.dtype(
     align=True,
 )
 
+# one row per dynamic body and world, where the work of servos is measured; zeros of bodies
+SERVO = np.dtype(
+    [
+        ("force", "f8", (3,)),  # N, part of DYNAMIC_STATE.force
+        ("work", "f8"),  # J, since the state was set
+    ],
+    align=True,
+)
+
 # one row per world, of the adaptive pair
 PACE = np.dtype(
     [
@@ -115,6 +124,7 @@ class State(NamedTuple):
         pace: [w] of PACE; [0] unless the integrator is adaptive.
         place: [w] where each world is: lane group times LANES plus lane, see `step.lane_order`.
         resident: [groups * LANES] the world at each place, -1 where there is none.
+        servo: [w, m] of SERVO; [0, m] without `features.measures_work`.
     """
 
     dynamic: Array
@@ -128,6 +138,7 @@ class State(NamedTuple):
     pace: Array
     place: Array
     resident: Array
+    servo: Array
 
     @property
     def nbytes(self) -> int:
@@ -160,6 +171,7 @@ def allocate(model: Model, features: Features, count: int) -> State:
         pace=np.zeros(count if features.integrator == ADAPTIVE else 0, PACE),
         place=np.arange(count),
         resident=np.full(groups * LANES, -1),
+        servo=np.zeros((count if features.measures_work else 0, len(model.dynamic)), SERVO),
     )
     state.resident[:count] = state.place
     state.dynamic["orientation"][..., 3] = 1.0

@@ -243,6 +243,17 @@ CLOCK = np.dtype(
     ],
     align=True,
 )
+
+# one row per dynamic body, where the work of servos is measured, see `state.SERVO`
+SERVO_WORK = np.dtype(
+    [
+        ("force", "f8", (3, LANES)),  # N
+        ("momentum", "f8", (3, LANES)),  # kg m/s, when the forces were computed
+        ("work", "f8", (LANES,)),  # J
+    ],
+    align=True,
+)
+
 # values of CLOCK.phase: no impact on the way, may have one, is at one, has had some
 FREE, MAY_MEET, MEETS, HAS_MET = range(4)
 # rows of `Workspace.kept`: when the substep began, at the end of a path with impacts, where a
@@ -286,6 +297,7 @@ class Workspace(NamedTuple):
         timing: [half-pairs] of TIMING; time control.
         clock: [1] of CLOCK; time control.
         kept: [4, solids] of SOLID, see BEGINNING; time control.
+        servo: [dynamic bodies] of SERVO_WORK, where the work of servos is measured.
     """
 
     solid: Array
@@ -306,6 +318,7 @@ class Workspace(NamedTuple):
     timing: Array
     clock: Array
     kept: Array
+    servo: Array
 
     @classmethod
     def of(cls, model: Model, features: Features) -> "Workspace":
@@ -339,4 +352,5 @@ class Workspace(NamedTuple):
             timing=aligned_zeros(len(half_pair) if kept else 0, TIMING),
             clock=aligned_zeros(1, CLOCK),
             kept=aligned_zeros((kept, solids), SOLID),
+            servo=aligned_zeros(len(model.dynamic) if features.measures_work else 0, SERVO_WORK),
         )

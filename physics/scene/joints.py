@@ -226,7 +226,8 @@ def _check(joint: Any, most: float = math.inf) -> None:
         instance(f"{kind}.name", joint.name, str)
     for name in ("anchor", "to_anchor", "axis"):
         value = getattr(joint, name, None)
-        if value is not None or (name == "anchor" and isinstance(joint, BallJoint | Hinge)):
+        needed = name == "axis" or (name == "anchor" and isinstance(joint, BallJoint | Hinge))
+        if value is not None or (needed and hasattr(joint, name)):
             object.__setattr__(joint, name, vector(f"{kind}.{name}", value))
     if hasattr(joint, "axis") and not any(joint.axis):
         raise ValueError(f"{kind}.axis must have a length above zero, got {joint.axis}")

@@ -61,9 +61,10 @@ class Particles:
         if np.abs(center).max() > 1e-14 * (np.abs(points).max() + self.radius):
             points = points - center
         object.__setattr__(self, "positions", tuple(map(tuple, points.tolist())))
-        order = np.lexsort(np.round(points / (_SAME * self.radius)).T)
+        same = max(_SAME * self.radius, np.finfo(float).tiny)
+        order = np.lexsort(np.round(points / same).T)
         steps = np.abs(np.diff(points[order], axis=0)).max(axis=1, initial=0.0)
-        if np.any(steps < _SAME * self.radius):
+        if np.any(steps < same):
             i, j = sorted(order[np.argmin(steps) :][:2].tolist())
             raise ValueError(
                 f"Particles.positions must differ, got {self.positions[i]} twice, at {i} and {j}"
@@ -142,6 +143,8 @@ def _checked(given: Any) -> Array:
     """
     try:
         points = np.array(given, dtype=float)
+    except OverflowError:  # an integer beyond all floats
+        raise ValueError(f"Particles.positions must be finite, got {given!r}") from None
     except (TypeError, ValueError):
         raise TypeError(f"Particles.positions must be numbers [n, 3], got {given!r}") from None
     if points.ndim != 2 or points.shape[1:] != (3,) or not len(points):

@@ -12,6 +12,8 @@ Vector = tuple[float, ...]
 ZERO: Vector = (0.0, 0.0, 0.0)
 IDENTITY: Vector = (0.0, 0.0, 0.0, 1.0)  # the quaternion x y z w of no rotation
 
+_LARGEST = int(np.iinfo(np.int64).max)
+
 
 def number(
     field: str,
@@ -29,7 +31,10 @@ def number(
     """
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
         raise TypeError(f"{field} must be a number, got {value!r} ({type(value).__name__})")
-    result = float(value)
+    try:
+        result = float(value)
+    except OverflowError:  # an integer beyond all floats
+        result = math.inf if value > 0 else -math.inf
     inside = low < result < high if exclusive else low <= result <= high
     if not math.isfinite(result) or not inside:
         limits = [
@@ -56,12 +61,14 @@ def integer(field: str, value: Any, *, low: int) -> int:
 
     Raises:
         TypeError: not an integer (a bool is not accepted).
-        ValueError: below `low`.
+        ValueError: below `low`, or beyond the integers of kernels.
     """
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise TypeError(f"{field} must be an integer, got {value!r} ({type(value).__name__})")
     if value < low:
         raise ValueError(f"{field} must be at least {low}, got {value!r}")
+    if value > _LARGEST:
+        raise ValueError(f"{field} must be at most {_LARGEST}, got {value!r}")
     return int(value)
 
 
@@ -74,6 +81,8 @@ def vector(field: str, value: Any, size: int = 3) -> tuple[float, ...]:
     """
     try:
         array = np.asarray(value, dtype=float)
+    except OverflowError:  # an integer beyond all floats
+        raise ValueError(f"{field} must be finite, got {value!r}") from None
     except (TypeError, ValueError):
         raise TypeError(f"{field} must be {size} numbers, got {value!r}") from None
     if array.shape != (size,):
@@ -158,7 +167,7 @@ def array(field: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
             if result.ndim and result.size and 0 in shape[1:]:  # would broadcast to no values
                 raise ValueError
             result = np.broadcast_to(result, shape)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         got = getattr(value, "shape", None)
         shown = f"shape {got}" if got is not None else repr(value)
         raise ValueError(f"{field} must be numbers of shape {shape}, got {shown}") from None

@@ -45,6 +45,7 @@ class Simulation:
         count: number of worlds.
         threads: number of threads.
         per_world_parameters: whether parameters may differ between worlds.
+        measures_work: whether the work of servos is summed up.
 
     Attributes:
         base: the model of the scene itself.
@@ -56,7 +57,13 @@ class Simulation:
     """
 
     def __init__(
-        self, scene: Scene, fidelity: Fidelity, count: int, threads: int, per_world_parameters: bool
+        self,
+        scene: Scene,
+        fidelity: Fidelity,
+        count: int,
+        threads: int,
+        per_world_parameters: bool,
+        measures_work: bool = False,
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene, self.fidelity, self.count, self.threads = scene, fidelity, count, threads
@@ -65,6 +72,8 @@ class Simulation:
         self.features: Features
         self._per_world = per_world_parameters
         self.base, self.features = self._build()
+        if measures_work:
+            self.features = self.features._replace(measures_work=True)
         self.model = expand_per_world(self.base, count) if per_world_parameters else self.base
         self._layout = Layout.of(scene, fidelity) if per_world_parameters else None
         self.parameters = Parameters.of(scene, count if per_world_parameters else 1)
@@ -138,6 +147,8 @@ class Simulation:
         touch = state.touch[..., : self.count]
         touch[:, NORMAL_FORCE, worlds], touch[:, FIRST_TOUCH, worlds] = 0.0, np.nan
         state.world["overflow"][worlds] = 0
+        if state.servo.size > 0:
+            state.servo[worlds] = 0
 
     @property
     def hidden_nbytes(self) -> int:
@@ -235,7 +246,7 @@ class Simulation:
                 self._table[...] = before
         model, state, table = self.model, self.state, self._table
         collision_substeps = self.fidelity.collision_substeps
-        groups, idle, scratches = -(-self.count // LANES), self._idle, self._scratches
+        groups, scratches = -(-self.count // LANES), self._scratches
         self._calls_to_sort -= 1 if substeps > 0 else 0
         sort = substeps > 0 and self._calls_to_sort <= 0
         sort = sort and can_sort(model, self.features, self.count)
@@ -244,10 +255,7 @@ class Simulation:
         moved: list[int] = []
 
         def run(first: int, last: int) -> Any:
-            try:
-                workspace = idle.pop()
-            except IndexError:  # happens once per thread
-                workspace = Workspace.of(self.base, self.features)
+            workspace = self.take_workspace()
             if sort:
                 try:
                     scratch = scratches.pop()
@@ -258,7 +266,7 @@ class Simulation:
             failed = kernel(
                 model, state, workspace, table, worlds, first, last, h, substeps, collision_substeps
             )
-            idle.append(workspace)
+            self.return_workspace(workspace)
             return failed
 
         failed = run_in_blocks(run, groups, self.threads)
@@ -271,6 +279,17 @@ class Simulation:
             return True
         self._table_valid = False
         return False
+
+    def take_workspace(self) -> Workspace:
+        """Working arrays that no other thread has; `return_workspace` keeps them."""
+        try:
+            return self._idle.pop()
+        except IndexError:  # happens once per thread
+            return Workspace.of(self.base, self.features)
+
+    def return_workspace(self, workspace: Workspace) -> None:
+        """Keeps working arrays for later calls."""
+        self._idle.append(workspace)
 
     def readout(self) -> Readout:
         """All poses and velocities now, drives after the bodies: read-only."""

@@ -13,6 +13,11 @@ from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.fields import make_fields, make_present_velocities, make_wrenches
 from physics.motion.gravity import gravity
 from physics.motion.kinematics import make_kinematics
+from physics.motion.servo_work import (
+    make_add_servo_work,
+    make_keep_servo_forces,
+    make_restore_servo_forces,
+)
 from physics.spring.contacts import make_contacts
 
 
@@ -27,7 +32,10 @@ def make_forces(features: Features):
     lag = 0.0 if features.integrator == EULER else 1.0
     present_velocities, fields = make_present_velocities(features), make_fields(features)
     wrenches, drives = make_wrenches(features), make_drives(features)
-    couple_fingers = make_finger_coupling(features)
+    keep_servo_forces, couple_fingers = (
+        make_keep_servo_forces(features),
+        make_finger_coupling(features),
+    )
     contacts = make_impulses(features) if features.impulse else make_contacts(features)
     joint_forces, impulse = make_joint_forces(features), features.impulse
 
@@ -38,6 +46,7 @@ def make_forces(features: Features):
         fields(model, workspace)
         wrenches(state, workspace)
         drives(model, workspace, drifted)
+        keep_servo_forces(model, workspace)
         if impulse:  # its sweeps correct the joints' forces
             joint_forces(model, state, workspace, h, drifted)
         contacts(model, state, workspace, g, span, drifted, elapsed)
@@ -57,6 +66,9 @@ def make_substep(features: Features):
     compound_frames = make_compound_frames(features)
     broadphase = make_broadphase(features)
     forces = make_forces(features)
+    add_first_work = make_add_servo_work(features, False)
+    add_last_work = make_add_servo_work(features, True)
+    restore_servo_forces = make_restore_servo_forces(features)
     euler = features.integrator == EULER
     # of a kick before the drift; the rest comes after the new forces
     before = 1.0 if euler else 0.5
@@ -68,6 +80,7 @@ def make_substep(features: Features):
     def substep(model, state, workspace, g, h, elapsed, starts_collision_step, refresh):
         """`refresh`: only computes the forces of states that were set from outside."""
         if not refresh:
+            add_first_work(model, workspace, before * h)
             kick(model, workspace, before * h)
             drift(model, workspace, h)
         kinematics(model, workspace)
@@ -78,7 +91,9 @@ def make_substep(features: Features):
         forces(model, state, workspace, g, h, span, drifted, elapsed)
         if refresh:
             end_refresh(model, state, workspace)
+            restore_servo_forces(model, state, workspace)
         elif not euler:
+            add_last_work(model, workspace, 0.5 * h)
             kick(model, workspace, 0.5 * h)
 
     return substep

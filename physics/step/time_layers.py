@@ -14,6 +14,7 @@ from physics.compiler.jit import LANES, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames
+from physics.motion.servo_work import make_load_servos, make_store_servos
 from physics.step.readout import make_write_rows
 from physics.step.runge_kutta_step import make_runge_kutta_substep
 from physics.step.time_control import make_controlled_substep, make_end_call
@@ -48,7 +49,7 @@ def first_diverged(model, workspace, i):
 def make_write_back(features: Features):
     """Stage that stores lanes into their worlds: diverged ones at once, all after the frame."""
     write_rows, end_call = make_write_rows(features), make_end_call(features)
-    clear_rest = make_clear_rest(features)
+    clear_rest, store_servos = make_clear_rest(features), make_store_servos(features)
 
     @stage
     def write_back(model, state, workspace, table, g, elapsed, last):
@@ -59,6 +60,7 @@ def make_write_back(features: Features):
                 if last or diverged != 0:
                     w = lane.world[i]
                     store(model, state, workspace, i, lane.start[i] + elapsed)
+                    store_servos(model, state, workspace, i)
                     write_rows(model, state, w, i, table)
                     state.world[w].needs_refresh = end_call(model, workspace, i)
                     state.world[w].diverged = diverged
@@ -82,7 +84,7 @@ def make_advance(features: Features):
     constants, forget = make_constants(features), make_forget(features)
     trials = features.integrator == RK4
     substep = make_runge_kutta_substep(features) if trials else make_controlled_substep(features)
-    write_back = make_write_back(features)
+    write_back, load_servos = make_write_back(features), make_load_servos(features)
 
     @large_entry
     def advance(
@@ -93,6 +95,7 @@ def make_advance(features: Features):
             model = constants(all_model, g)
             if load(model, state, workspace, chosen, g) == 0:
                 continue
+            load_servos(model, state, workspace)
             # for every group: one that diverged must not affect the next
             write_static_frames(model, workspace)
             write_drive_frames(model, workspace)

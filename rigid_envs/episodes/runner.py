@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-from physics import Fidelity, Parameters, Snapshot, World
+from physics import Fidelity, Parameters, Scene, Snapshot, World
 from physics.compiler.jit import columns
 from physics.scene.validation import choice, instance
 from rigid_envs.episodes.arguments import argument_names, make_task
@@ -83,7 +83,7 @@ class Runner:
         ranges = self.randomization.check(randomize)
         self._ranges = ranges
         per_world = self.randomization.needs_per_world_parameters(ranges)
-        self.world = World(scene, fidelity, count, threads, per_world_parameters=per_world)
+        self.world = self._worlds(scene, fidelity, count, threads, per_world)
         if per_world:
             self.randomization.check_step(self.world, ranges)
         self.count = count
@@ -126,6 +126,17 @@ class Runner:
         self._now = self.world.read()
         self._goal_distance = np.zeros(count)
         self._goals = np.zeros((count, len(goal_low)), dtype=np.float32, order="F")
+
+    def _worlds(
+        self,
+        scene: Scene,
+        fidelity: str | Fidelity,
+        count: int,
+        threads: int | None,
+        per_world_parameters: bool,
+    ) -> World:
+        """The worlds of the episodes; benchmarks overwrite it to measure more in them."""
+        return World(scene, fidelity, count, threads, per_world_parameters=per_world_parameters)
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
@@ -178,9 +189,7 @@ class Runner:
         """
         old = self.world
         if not old.features.per_world_parameters:
-            self.world = World(
-                old.scene, old.fidelity, self.count, old.threads, per_world_parameters=True
-            )
+            self.world = self._worlds(old.scene, old.fidelity, self.count, old.threads, True)
             parameters = Parameters.of(old.scene, self.count)
             self.world.restore(old.snapshot()._replace(parameters=parameters))
 

@@ -1,0 +1,71 @@
+"""The energy balance of each world between resets.
+
+With kinetic energy K of bodies and drives, potential energy U of gravity, energy V of the normal
+springs of contacts, and work W of the servos,
+
+    K + U + V  <=  (K + U + V at the start) + W,
+
+for friction, damping and inelastic impacts only take energy. What exceeds it by more than 1e-3 of
+the servos' work, in absolute values, or 1 mJ is a failure.
+
+With the impulse law V counts at the start only, where bodies are at rest: later an instantaneous
+collision may leave an overlap that holds no energy. This tests no less than what is returned.
+"""
+
+import numpy as np
+
+from physics import World
+
+Array = np.ndarray
+
+FRACTION = 1e-3  # of the servos' work, step by step in absolute values
+LEAST = 1e-3  # J
+
+
+def energy(world: World) -> Array:
+    """[count] J of bodies, drives and contacts."""
+    bodies = world.kinetic_energy() + world.potential_energy()
+    drives = world.drive_energy()
+    total = bodies.copy()
+    if world.fidelity.law == "spring":
+        total += world.elastic_energy()
+    for drive in range(drives.shape[1]):
+        total += drives[:, drive]
+    return total
+
+
+def start_energy(world: World) -> Array:
+    """[count] J at the start of episodes."""
+    stored = world.elastic_energy() if world.fidelity.law == "impulse" else 0.0
+    return energy(world) + stored
+
+
+def work(world: World) -> Array:
+    """[count] J, of all servos since the state was set."""
+    return np.asarray(world.drive_work().sum(axis=1))
+
+
+class Balance:
+    """The balance of `count` worlds.
+
+    Attributes:
+        gain: [count] J, energy beyond that at the start and the servos' work, after the last step.
+        allowed: [count] J, what the gain may be.
+    """
+
+    def __init__(self, world: World) -> None:
+        """Begins in the present state of all worlds."""
+        self.gain = np.zeros(world.count)
+        self.allowed = np.full(world.count, LEAST)
+        self._start, self._work = start_energy(world), np.zeros(world.count)
+        self._total = np.zeros(world.count)
+
+    def update(self, world: World, began: Array) -> None:
+        """After a step; the balance of worlds of the mask `began` starts again now."""
+        now, done = energy(world), work(world)
+        self._total += np.abs(done - self._work)
+        self._work = done
+        if began.any():
+            self._start[began], self._total[began] = start_energy(world)[began], 0.0
+        self.gain = now - self._start - done
+        self.allowed = np.maximum(FRACTION * self._total, LEAST)

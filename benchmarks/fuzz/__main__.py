@@ -1,0 +1,122 @@
+"""Random scenes: each must be refused with a reason that names a field, or stay finite.
+
+The scenes have 1 to 6 bodies of random shapes with masses of 1e-6 to 1e6 kg, sizes of 1e-4 to
+1e2 m, speeds up to 1e4 m/s and rad/s, gravity up to 1e3 m/s^2, any friction, restitution and
+stiffness, at any pose, with drives, joints and fields, and any settings of Fidelity. They belong to
+families, each with kernels of its own. A scene that runs does so for 50 substeps; a divergence must
+come as SimulationDiverged with a reason. Constructors are then called with garbage. What is not as
+it must be is a finding, and saved as a script in .failures/; so are divergences.
+
+python -m benchmarks.fuzz [--scenes 1e5] [--families "one box" ...] [--resume CSV]
+"""
+
+import argparse
+import csv
+from collections import Counter
+from pathlib import Path
+from time import perf_counter
+
+from benchmarks.fuzz.arguments import findings
+from benchmarks.fuzz.families import FAMILIES, Family
+from benchmarks.fuzz.outcomes import DIVERGED, FINDING, RAN, REFUSED, Outcome, outcome_of, save
+from benchmarks.report.provenance import ROOT, describe, provenance
+from benchmarks.report.tables import Cell, Table, plain
+
+KINDS = (REFUSED, RAN, DIVERGED, FINDING)
+SAVED = 5  # scenes of each family and kind that are saved
+CHUNK = 500  # scenes; a line of the CSV each
+HEADER = ["family", "first scene", *KINDS, "kernels", "s"]
+Counts = dict[tuple[str, int], list[float]]
+
+
+def run_family(family: Family, first: int, count: int) -> list[float]:
+    """Runs scenes first ... first + count - 1; returns the numbers of HEADER after these."""
+    kinds: Counter[str] = Counter()
+    kernels, start = set(), perf_counter()
+    for number in range(first, first + count):
+        outcome: Outcome = outcome_of(family, number)
+        kinds[outcome.kind] += 1
+        if outcome.features:
+            kernels.add(outcome.features)
+        if outcome.kind in (DIVERGED, FINDING) and kinds[outcome.kind] <= SAVED:
+            path = save(ROOT / ".failures", family, number, outcome)
+            print(f"{family.name} {number}: {outcome.kind}: {outcome.reason[:200]} ({path.name})")
+    return [*(float(kinds[kind]) for kind in KINDS), float(len(kernels)), perf_counter() - start]
+
+
+def load(path: Path | None) -> Counts:
+    """The lines of a resumed file."""
+    if not path or not path.exists():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if not rows or rows[0] != HEADER:
+        raise ValueError(f"{path} must begin with the line {','.join(HEADER)}")
+    return {(row[0], int(row[1])): list(map(float, row[2:])) for row in rows[1:]}
+
+
+def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
+    """Runs all chunks that a resumed file doesn't hold."""
+    results = load(path)
+    each = max(1, round(scenes / len(families)))
+    chunks = [
+        (family, first, min(CHUNK, each - first))
+        for first in range(0, each, CHUNK)
+        for family in families
+    ]
+    left = [chunk for chunk in chunks if (chunk[0].name, chunk[1]) not in results]
+    start = perf_counter()
+    for done, (family, first, count) in enumerate(left):
+        row = run_family(family, first, count)
+        results[family.name, first] = row
+        if path:
+            new = not path.exists()
+            with path.open("a", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                if new:
+                    writer.writerow(HEADER)
+                writer.writerow([family.name, first, *row])
+        spent = perf_counter() - start
+        counted = ", ".join(f"{n:.0f} {kind}" for n, kind in zip(row, KINDS, strict=False))
+        print(
+            f"{family.name}: {counted} in {row[-1]:.0f} s; "
+            f"{spent / (done + 1) * (len(left) - done - 1) / 60:.0f} min left",
+            flush=True,
+        )
+    return results
+
+
+def table(results: Counts) -> Table:
+    """One row per family, and the total."""
+    rows: list[list[Cell]] = []
+    for name in dict.fromkeys(family for family, _ in results):
+        own = [row for (family, _), row in results.items() if family == name]
+        kernels = max(row[len(KINDS)] for row in own)
+        total = [sum(column) for column in zip(*own, strict=True)]
+        rows.append([name, *total[: len(KINDS)], kernels, total[-1]])
+    sums = [sum(float(row[i] or 0.0) for row in rows) for i in range(1, len(HEADER) - 1)]
+    rows.append(["all", *sums])
+    return Table("fuzz", f"Scenes of {len(rows) - 1} families", ["family", *HEADER[2:]], rows)
+
+
+def main() -> None:
+    """Runs scenes of all families, then constructors; prints the tables."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.fuzz", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    names = [family.name for family in FAMILIES]
+    parser.add_argument("--scenes", type=float, default=1e4, help="of all families together")
+    parser.add_argument("--families", nargs="+", choices=names, default=names, metavar="FAMILY")
+    parser.add_argument("--resume", type=Path, metavar="CSV", help="chunks are appended to it")
+    options = parser.parse_args()
+    print(describe(provenance()))
+    chosen = [family for family in FAMILIES if family.name in options.families]
+    print(plain(table(run(chosen, options.scenes, options.resume))))
+    calls, wrong = findings()
+    print(f"\n{calls} constructors with garbage: {len(wrong)} findings")
+    print("\n".join(wrong))
+
+
+if __name__ == "__main__":
+    main()
