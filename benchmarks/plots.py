@@ -37,7 +37,7 @@ TASKS = ROOT / "docs/images/tasks.png"
 # plots of docs/trade/trade.csv: their trials
 TRADE = {
     ROOT / "docs/images/trade.png": (
-        "slide", "incline, rest", "bounce, e = 0.5", "tower of 10", "250 : 1", "grasp",
+        "slide", "incline, rest", "bounce, e = 0.5", "tower of 5", "250 : 1", "grasp",
     ),
     ROOT / "docs/trade/friction.png": tuple(trial.name for trial in sliding.TRIALS),
     ROOT / "docs/trade/impacts.png": tuple(trial.name for trial in impacts.TRIALS),
@@ -61,8 +61,9 @@ def run() -> None:
             tasks.draw(path := TASKS)
         elif name == "trade":
             rows = store.load()
+            done = {row.trial for row in rows}
             for path, trials in TRADE.items():
-                trade.draw(rows, trials, path)
+                trade.draw(rows, [trial for trial in trials if trial in done], path)
                 print(f"written: {path.relative_to(ROOT)}")
             continue
         else:

@@ -20,7 +20,8 @@ from physics import Fidelity, World
 
 MANY, PEER_MANY = 4096, 64
 STEPS_ONE, STEPS_MANY, STEPS_SETTLED = 8000, 400, 200
-REPEATS, ENOUGH = 3, 0.05  # s
+# repeats, and s of wall time of them after which a measurement ends
+REPEATS, ENOUGH = 3, 0.3
 
 
 def maker(options: Fidelity | MujocoOptions, trial: Trial, threads: int = THREADS) -> Make:
@@ -44,14 +45,14 @@ def _measured(trial: Trial, step: float, steps: int) -> float:
 
 def _fastest(work: Callable[[], None], prepare: Callable[[], None]) -> float:
     """Shortest duration in s of some repeats of work."""
-    shortest, spent, repeats = math.inf, 0.0, 0
-    while repeats < REPEATS or spent < ENOUGH:
+    shortest, spent = math.inf, 0.0
+    for _ in range(REPEATS):
         prepare()
         begin = perf_counter()
         work()
         took = perf_counter() - begin
-        shortest, spent, repeats = min(shortest, took), spent + took, repeats + 1
-        if spent > 20.0 * ENOUGH:
+        shortest, spent = min(shortest, took), spent + took
+        if spent > ENOUGH:
             break
     return shortest
 

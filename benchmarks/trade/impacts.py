@@ -32,7 +32,7 @@ def bounce(e: float) -> Trial:
     return Trial(
         f"bounce, e = {e:g}", f"A ball bounces, coefficient of restitution {e:g}",
         "largest error of e over 32 times of impact within a step",
-        sphere_on_ground(RADIUS, 0.0, e, gravity=0.0), error, _fall, PHASES,
+        sphere_on_ground(RADIUS, 0.0, e, gravity=0.0), error, _fall, worlds=PHASES,
         time=0.2, restitution=e,
     )  # fmt: skip
 
@@ -51,7 +51,7 @@ def oblique(name: str, title: str, friction: float, along: float) -> Trial:
 
     return Trial(
         name, title, "largest relative error of the speed along the ground after the impact",
-        sphere_on_ground(RADIUS, friction, e, gravity=0.0), error, begin, PHASES,
+        sphere_on_ground(RADIUS, friction, e, gravity=0.0), error, begin, worlds=PHASES,
         time=0.2, restitution=e,
     )  # fmt: skip
 
@@ -80,7 +80,7 @@ def _bullet() -> Trial:
     return Trial(
         "bullet", "A bullet of 5 mm at 300 m/s rebounds from a wall of 2 mm",
         "largest relative error of its distance from the wall after 40 ms",
-        scene, error, begin, SHOTS, time=FRAME, restitution=e,
+        scene, error, begin, worlds=SHOTS, time=FRAME, restitution=e,
     )  # fmt: skip
 
 

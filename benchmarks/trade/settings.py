@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from benchmarks.peers.mujoco_scene import MujocoOptions
 from benchmarks.trade.trial import Trial
 from physics import PRESETS, Fidelity
+from physics.scene.fidelity import FIND_IMPACTS
 
 OURS, PEER = "rigid-envs", "MuJoCo"
 # s; each divides the 40 ms between two readings
@@ -91,6 +92,8 @@ def ours(trial: Trial) -> Iterator[Setting]:
         yield Setting(OURS, "presets", name, fidelity)
     curves = _ROTATION_CURVES if trial.joints else _CONTACT_CURVES
     for curve, fidelity in curves.items():
+        if fidelity.time_control in FIND_IMPACTS and not trial.events:
+            continue
         for step in (*STEPS, FINEST):
             yield Setting(OURS, curve, milliseconds(step), replace(fidelity, substep=step))
     if trial.joints and not trial.scene.joints:

@@ -48,7 +48,7 @@ TRIALS = (
     Trial(
         "slide", "A cube slides to rest, from 0.5 to 2 m/s",
         "largest relative error of the stopping distance v²/(2 μ g)",
-        block_on_ground(BLOCK, FRICTION, mass=1.0), _stopping, along_x(SPEEDS), len(SPEEDS),
+        block_on_ground(BLOCK, FRICTION, mass=1.0), _stopping, along_x(SPEEDS), worlds=len(SPEEDS),
         settle=1.0, time=0.6,
     ),
     Trial(

@@ -25,7 +25,7 @@ def _tower(cubes: int) -> Trial:
     return Trial(
         f"tower of {cubes}", f"{cubes} cubes of 4 cm stand on each other for 10 s",
         "drift of the cube that drifts most plus sink of the topmost, relative to a cube's width",
-        tower(cubes), _standing, settle=1.0, time=STANDING, timed=0.4,
+        tower(cubes), _standing, settle=1.0, time=STANDING, timed=0.4, events=False,
     )  # fmt: skip
 
 
@@ -55,7 +55,6 @@ def _close(worlds: Worlds) -> None:
     own: Any = worlds
     if hasattr(own, "move_drives"):
         own.move_drives([(0.0, -0.015, 0.2), (0.0, 0.015, 0.2)], 1e-3)
-    worlds.advance(1.0)
 
 
 def _slip(trace: Trace) -> float:
@@ -69,11 +68,11 @@ TRIALS = (
     Trial(
         "250 : 1", "A cube 250 times as heavy as one below stands on a tower of five for 10 s",
         "drift of the cube that drifts most plus sink of the topmost, relative to a cube's width",
-        heavy_tower(), _standing, settle=1.0, time=STANDING, timed=0.4,
+        heavy_tower(), _standing, settle=1.0, time=STANDING, timed=0.4, events=False,
     ),
     Trial(
         "grasp", "A gripper holds a cube for 5 s, with five times the force that it needs",
         "slip of the cube, relative to its width",
-        grasp(), _slip, _close, time=HELD, timed=0.4, grip=True,
+        grasp(), _slip, prepare=_close, settle=1.0, time=HELD, timed=0.4, grip=True, events=False,
     ),
 )  # fmt: skip

@@ -1,0 +1,133 @@
+"""How policies carry over between fidelities: python -m benchmarks.policies [--tasks push ...].
+
+Trains a policy of each task at every preset, with the settings of configs/ppo.yaml, and measures
+its success at every preset: rows are where it was trained, columns where it acts. With --finish,
+training at "fast" that ends with a stage at "accurate" is compared with training at "accurate"
+throughout: wall time, and success at "accurate". Runs are kept in a folder, and a run that was
+interrupted resumes; what is measured is saved in benchmarks/results.json.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from benchmarks.report.provenance import describe, provenance
+from benchmarks.report.results_file import save
+from benchmarks.report.tables import Cell, Table, plain
+from physics import PRESETS
+from training.policies.trained_policy import trained_policy
+from training.results.evaluate import evaluate
+from training.runs.run_folder import RunFolder
+from training.sb3.train import resume, train
+from training.settings.config import TrainConfig
+from training.settings.config_file import load_config
+
+EPISODES = 1000
+# steps of the last stage of --finish, as a fraction of those of a whole training
+LAST_STAGE = 0.1
+TASKS = ("push", "throw", "stack")
+
+
+def _id(task: str) -> str:
+    return f"RigidEnvs/{task.capitalize()}-v0"
+
+
+def config_at(task: str, preset: str) -> TrainConfig:
+    """The settings of a task, all stages at one preset."""
+    config = load_config("ppo", _id(task))
+    changes: dict[str, Any] = {"env_kwargs": {**config.env_kwargs, "fidelity": preset}}
+    if config.finetune_env_kwargs:
+        changes["finetune_env_kwargs"] = {**config.finetune_env_kwargs, "fidelity": preset}
+    return config.replace(**changes)
+
+
+def finished_at(task: str, first: str, last: str) -> TrainConfig:
+    """Training at one preset that ends with a stage at another one."""
+    config = config_at(task, first)
+    if config.finetune_timesteps:
+        return config.replace(
+            finetune_env_kwargs={**config.finetune_env_kwargs, "fidelity": last}
+        )  # fmt: skip
+    steps = int(LAST_STAGE * config.n_timesteps)
+    return config.replace(finetune_timesteps=steps, finetune_env_kwargs={"fidelity": last})
+
+
+def run_of(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
+    """A finished run in a folder, and its wall time in s; it is trained or resumed if needed."""
+    runs = sorted(folder.rglob("config.yaml"))
+    if not runs:
+        result = train(config, folder, quiet=True)
+        return result.folder, result.seconds
+    run = RunFolder(runs[0].parent)
+    summary = run.path / "seconds.txt"
+    if summary.exists():
+        return run, float(summary.read_text())
+    result = resume(run, quiet=True)
+    return result.folder, result.seconds
+
+
+def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
+    """As `run_of`; keeps the wall time beside the run."""
+    run, seconds = run_of(config, folder)
+    (run.path / "seconds.txt").write_text(f"{seconds:.1f}")
+    return run, seconds
+
+
+def success(run: RunFolder, preset: str) -> float:
+    """Fraction of episodes whose goal is met at the end, at a preset."""
+    found = evaluate(trained_policy(run.path), EPISODES, quiet=True, fidelity=preset)
+    return float(found.success_at_end.mean())
+
+
+def matrix(task: str, presets: list[str], folder: Path) -> Table:
+    """Success of the policies of a task."""
+    rows: list[list[Cell]] = []
+    for preset in presets:
+        run, seconds = trained(config_at(task, preset), folder / f"{task}_{preset}")
+        rows.append([preset, seconds, *(success(run, other) for other in PRESETS)])
+        print(task, *rows[-1], flush=True)
+    columns = ["trained at", "s of training", *(f"success at {name}" for name in PRESETS)]
+    title = f"{task.capitalize()}, PPO, {EPISODES:,} episodes"
+    return Table(f"policies {task}", title, columns, rows)
+
+
+def finishing(task: str, folder: Path) -> Table:
+    """Training at "fast" and finishing at "accurate", against "accurate" throughout."""
+    ways = {
+        "accurate throughout": (config_at(task, "accurate"), f"{task}_accurate"),
+        "fast, then accurate": (finished_at(task, "fast", "accurate"), f"{task}_fast_accurate"),
+        "fast throughout": (config_at(task, "fast"), f"{task}_fast"),
+    }
+    rows: list[list[Cell]] = []
+    for name, (config, place) in ways.items():
+        run, seconds = trained(config, folder / place)
+        rows.append([name, seconds, success(run, "accurate")])
+        print(task, *rows[-1], flush=True)
+    columns = ["trained at", "s of training", "success at accurate"]
+    return Table(f"finishing {task}", f"{task.capitalize()}: where to train", columns, rows)
+
+
+def main() -> None:
+    """Prints and saves the tables."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.policies", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--tasks", nargs="+", choices=TASKS, default=["push", "throw"])
+    parser.add_argument("--presets", nargs="+", choices=list(PRESETS), default=list(PRESETS))
+    parser.add_argument("--finish", action="store_true", help="where to train, in wall time")
+    parser.add_argument("--folder", type=Path, default=Path("runs/policies"), help="of the runs")
+    options = parser.parse_args()
+    this_run = provenance()
+    print(describe(this_run))
+    for task in options.tasks:
+        tables = [matrix(task, options.presets, options.folder)]
+        if options.finish:
+            tables.append(finishing(task, options.folder))
+        for table in tables:
+            print(plain(table) + "\n", flush=True)
+        save(tables, this_run, keep=True)
+
+
+if __name__ == "__main__":
+    main()
