@@ -109,7 +109,7 @@ def test_the_page_works_in_a_browser(browser_page):
     assert "5 cubes" in browser_page.inner_text("#title")
     assert points.count() != count
     browser_page.click("#worlds button[data-v=one]")
-    assert "one world" in browser_page.inner_text("#plot")
+    assert "one world" in browser_page.text_content("#plot")
     before = points.count()
     browser_page.locator("#legend input").first.uncheck()
     assert points.count() < before

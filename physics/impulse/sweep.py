@@ -10,8 +10,6 @@ load / k. The speed at which overlapping bodies are pushed apart is limited.
 
 Friction is rigid: it removes the sliding velocity that remains, with at most mu times the normal
 impulse. An anchor remembers how far the point has crept since it came to stick, and pulls it back.
-The sweep that relaxes leaves friction as it is where the solids are apart. There it takes back
-normal impulses of the last step; to take back their friction, too, would drive what slides.
 The effective mass across the normal is the smallest in any direction, so that a step can only
 decrease the energy even where the cone cuts it. Resistance against rolling and spinning is the same
 law for the relative angular velocity.
@@ -113,10 +111,9 @@ def make_sweep(features):
                     limit = mu * new
                     size = math.sqrt(qx * qx + qy * qy + qz * qz)
                     cut = limit / size if size > limit else 1.0
-                    acts = soft | (not apart)
-                    qx = cut * qx if acts else px
-                    qy = cut * qy if acts else py
-                    qz = cut * qz if acts else pz
+                    qx *= cut
+                    qy *= cut
+                    qz *= cut
                     tangential[0, i] = qx
                     tangential[1, i] = qy
                     tangential[2, i] = qz
