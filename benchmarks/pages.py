@@ -15,7 +15,7 @@ from benchmarks.report.summary import summary
 from benchmarks.report.tables import Cell, Table, markdown
 from benchmarks.trade import page as trade_page
 from benchmarks.trade import store
-from benchmarks.trade.measure import TRIALS
+from benchmarks.trade.trials import TRIALS
 from physics.reference.promises import PROMISES
 
 PAGES = (ROOT / "README.md", ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "trade.md")

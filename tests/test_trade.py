@@ -11,9 +11,9 @@ from benchmarks.pages import trade_text
 from benchmarks.plots import TRADE
 from benchmarks.report.results_file import load as saved_tables
 from benchmarks.trade import fronts, page, store
-from benchmarks.trade.measure import TRIALS, options_text
-from benchmarks.trade.settings import OURS, PEER, ours
+from benchmarks.trade.settings import OURS, PEER, options_text, ours
 from benchmarks.trade.trial import judge
+from benchmarks.trade.trials import TRIALS
 from physics import PRESETS, World
 
 ROWS = store.load()

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.peers.mujoco_scene import MujocoOptions
+from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.peers.mujoco_worlds import MujocoWorlds
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity, Scene, World

@@ -10,7 +10,8 @@ from mujoco import MjData, mjtState, rollout
 from mujoco.batch import Batch
 
 from benchmarks.measure.episodes import recorded_episode
-from benchmarks.peers.mujoco_scene import MujocoOptions, model_of
+from benchmarks.peers.mujoco_options import MujocoOptions
+from benchmarks.peers.mujoco_scene import model_of
 from benchmarks.report.provenance import THREADS
 from benchmarks.report.timing import Side
 from rigid_envs.tasks import TASKS

@@ -7,7 +7,8 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from benchmarks.peers.mujoco_scene import MujocoOptions, model_of
+from benchmarks.peers.mujoco_options import MujocoOptions
+from benchmarks.peers.mujoco_scene import model_of
 from benchmarks.report.provenance import THREADS
 from physics import Scene
 from physics.rotation import rotate, rotate_back

@@ -12,7 +12,7 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
-from benchmarks.peers.mujoco_scene import MujocoOptions
+from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.peers.mujoco_worlds import MujocoWorlds
 from benchmarks.report.provenance import THREADS
 from benchmarks.trade.trial import FRAME, Make, Trial, start

@@ -3,24 +3,18 @@
 import argparse
 import math
 from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.peers.mujoco_scene import MujocoOptions
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.results_file import save
-from benchmarks.trade import fronts, impacts, rotating, sliding, standing, store
+from benchmarks.trade import fronts, store
 from benchmarks.trade.cost import maker, many_worlds, one_world
-from benchmarks.trade.settings import Setting, ours, peers
+from benchmarks.trade.settings import Setting, options_text, ours, peers
 from benchmarks.trade.trial import Outcome, Trial, judge
+from benchmarks.trade.trials import TRIALS
 from benchmarks.trade.tuning_peer import tuned
-from physics import Fidelity
 
-TRIALS: dict[str, Trial] = {
-    trial.name: trial
-    for trial in (*sliding.TRIALS, *impacts.TRIALS, *rotating.TRIALS, *standing.TRIALS)
-}
 ROUNDS = 2  # of timing; the faster one counts, as other load can only add time
 WRONG = 1.0  # an error from which on a setting's cost means nothing
 
@@ -57,17 +51,6 @@ def measured(trial: Trial) -> Iterator[store.Row]:
             outcome.status, outcome.error, outcome.energy, outcome.penetration, one, many,
             outcome.note,
         )  # fmt: skip
-
-
-def options_text(options: Fidelity | MujocoOptions) -> str:
-    """Options as Python text, without the defaults."""
-    kind = type(options)
-    changed = [
-        f"{field.name}={getattr(options, field.name)!r}"
-        for field in fields(options)
-        if getattr(options, field.name) != field.default
-    ]
-    return f"{kind.__name__}({', '.join(changed)})"
 
 
 def _progress(trial: Trial, what: str, done: int, count: int, begin: float) -> None:

@@ -1,10 +1,10 @@
 """The settings that are measured: curves of our engine and of MuJoCo, one point a step."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
-from benchmarks.peers.mujoco_scene import MujocoOptions
+from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.trade.trial import Trial
 from physics import PRESETS, Fidelity
 from physics.scene.fidelity import FIND_IMPACTS
@@ -132,3 +132,14 @@ def peers(
                 options = MujocoOptions(step, solref=solref, solimp=(0.999, 0.999, 0.001))
                 name = f"tuned to e, ωh = {ratio:g}"
                 yield Setting(PEER, name, milliseconds(step), options)
+
+
+def options_text(options: Fidelity | MujocoOptions) -> str:
+    """Options as Python text, without the defaults."""
+    kind = type(options)
+    changed = [
+        f"{field.name}={getattr(options, field.name)!r}"
+        for field in fields(options)
+        if getattr(options, field.name) != field.default
+    ]
+    return f"{kind.__name__}({', '.join(changed)})"

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.peers.mujoco_scene import MujocoOptions
+from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.peers.mujoco_worlds import MujocoWorlds
 from benchmarks.trade.impacts import SPEED, bounce
 from benchmarks.trade.trial import start
