@@ -12,7 +12,8 @@ Vector = tuple[float, ...]
 ZERO: Vector = (0.0, 0.0, 0.0)
 IDENTITY: Vector = (0.0, 0.0, 0.0, 1.0)  # the quaternion x y z w of no rotation
 
-_LARGEST = int(np.iinfo(np.int64).max)
+# half of what an int64 holds: a sum of two fits, too
+_LARGEST = 2**62
 
 
 def number(
@@ -68,7 +69,7 @@ def integer(field: str, value: Any, *, low: int) -> int:
     if value < low:
         raise ValueError(f"{field} must be at least {low}, got {value!r}")
     if value > _LARGEST:
-        raise ValueError(f"{field} must be at most {_LARGEST}, got {value!r}")
+        raise ValueError(f"{field} must be at most 2**62, got {value!r}")
     return int(value)
 
 
