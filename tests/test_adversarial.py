@@ -150,3 +150,10 @@ def test_steps_are_divided_by_speed():
     slow = sum(count for c, _, count in chunks if c.preset == "accurate")
     assert (fast + slow) * command.WORLDS == pytest.approx(1e8, rel=1e-3)
     assert fast > 4 * slow
+
+
+def test_worlds_of_another_fidelity_measure_work_too():
+    runner = MeasuredRunner("push", "fast", "scene", 2, 1)
+    runner.reset(np.ones(2, dtype=bool), np.arange(2))
+    runner.change_fidelity("balanced")
+    assert runner.world.features.measures_work

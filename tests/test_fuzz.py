@@ -1,4 +1,4 @@
-"""Random scenes and arguments are refused by name, or run and stay finite."""
+"""Random scenes and arguments raise errors that name the field, or run and stay finite."""
 
 import pytest
 

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from physics import Fidelity, Scene, World
 from rigid_envs import Runner
 from rigid_envs.episodes.draws import uniform
 
@@ -37,6 +36,8 @@ class MeasuredRunner(Runner):
         threads: number of threads.
     """
 
+    measures_work = True
+
     def __init__(self, task: str, preset: str, parameters: str, count: int, threads: int) -> None:
         """Builds the worlds."""
         self._draws_masses = parameters == "random"
@@ -49,19 +50,6 @@ class MeasuredRunner(Runner):
             masses = (self._masses / span, self._masses * span)
             # checked once, not at every reset
             self.world.check_parameters({**ranges, "mass": masses})
-
-    def _worlds(
-        self,
-        scene: Scene,
-        fidelity: str | Fidelity,
-        count: int,
-        threads: int | None,
-        per_world_parameters: bool,
-    ) -> World:
-        return World(
-            scene, fidelity, count, threads, per_world_parameters=per_world_parameters,
-            measure_work=True,
-        )  # fmt: skip
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None

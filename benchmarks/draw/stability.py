@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 
 from benchmarks.draw.figure import INK
 
@@ -62,9 +62,8 @@ def _panel(axes: Axes, cells: Sequence[Any]) -> None:
         limits[column] = cell.limit
     colors = ListedColormap(list(OUTCOMES.values()))
     axes.pcolormesh(grid, cmap=colors, vmin=-0.5, vmax=2.5, edgecolors="white", linewidth=0.4)
-    if hatch.any():
-        masked = np.ma.masked_where(hatch == 0, hatch)
-        axes.pcolor(masked, hatch="////", alpha=0.0)
+    for row, column in np.argwhere(hatch):
+        axes.add_patch(Rectangle((column, row), 1, 1, fill=False, hatch="////", linewidth=0))
     # in cells: logarithmic in the substep
     steps = np.log(np.array(substeps))
     shown = limits > 0.0

@@ -48,12 +48,28 @@ class MujocoWorlds:
             )
         else:
             for i, body in enumerate(scene.bodies):
-                spin = rotate_back(np.array(body.orientation), np.array(body.angular_velocity))
-                address = self._model.body_dofadr[1 + i]
-                for data in self._data:
-                    data.qvel[address : address + self._model.body_dofnum[1 + i]] = spin[
-                        : self._model.body_dofnum[1 + i]
-                    ]
+                spin = np.array(body.angular_velocity)
+                self._turn(1 + i, rotate_back(np.array(body.orientation), spin))
+
+    def _turn(self, body: int, spin: Array) -> None:
+        """Sets the joint of a body of the model turning at `spin` rad/s, in the body frame.
+
+        Raises:
+            ValueError: a joint that doesn't turn.
+        """
+        joint, address = self._model.body_jntadr[body], self._model.body_dofadr[body]
+        kind = self._model.jnt_type[joint]
+        if kind == mujoco.mjtJoint.mjJNT_BALL:
+            speed = spin
+        elif kind == mujoco.mjtJoint.mjJNT_HINGE:
+            speed = np.atleast_1d(spin @ self._model.jnt_axis[joint])
+        else:
+            raise ValueError("only balls and hinges can start turning")
+        for data in self._data:
+            data.qvel[address : address + len(speed)] = speed
+
+    def move_drives(self, target: Any, time: float) -> None:
+        """Does nothing: fingers press from the beginning, other drives rest where they are."""
 
     def advance(self, time: float) -> None:
         """Advances by `time` s, rounded to whole steps."""

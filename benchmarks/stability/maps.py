@@ -9,6 +9,7 @@ from physics import Body, Box, Fidelity, Ground, Material, Scene, World
 from physics.reference.scenes import CUBE, block_on_ground, heavy_top, sphere_on_ground, tower
 
 WIDTH = 2.0 * CUBE.half_extents[2]  # m
+SLAB, SLIDING = (0.05, 0.05, 0.003), 1.0  # m, half extents; m/s
 # of a body's width: how far it may move from where it belongs
 FAR = 0.1
 # of e, and of the kinetic energy
@@ -54,7 +55,10 @@ def _rebound(e: Callable[[float], float], speed: Callable[[float], float]) -> Ca
 
 
 def _stiff(stiffness: float) -> Scene:
-    return block_on_ground(stiffness=stiffness)
+    """A cube lands at 0.1 m/s while it turns, so that its contacts are excited."""
+    return block_on_ground(
+        stiffness=stiffness, linear_velocity=(0, 0, -0.1), angular_velocity=(0.5, 0.3, 0)
+    )  # fmt: skip
 
 
 def _sizes(ratio: float) -> Scene:
@@ -80,17 +84,17 @@ def _hit(speed: float, restitution: float = 0.5) -> Scene:
 
 
 def _slides(friction: float) -> Scene:
-    """A cube slides at 1 m/s."""
-    return block_on_ground(friction=friction, linear_velocity=(1.0, 0.0, 0.0))
+    """A slab slides; it is so flat that no friction tips it over."""
+    return block_on_ground(SLAB, friction, linear_velocity=(SLIDING, 0.0, 0.0))
 
 
 def _stopped_elsewhere(world: World, friction: float) -> bool:
-    """Whether the cube isn't where Coulomb's friction stops it, or has tipped over."""
+    """Whether the slab isn't where Coulomb's friction stops it."""
     time, pull = float(world.time[0]), 9.81 * friction
-    stop = min(time, 1.0 / pull) if pull > 0.0 else time
-    exact = stop - 0.5 * pull * stop**2
-    tipped = abs(world.position[0, 0, 2] - 0.5 * WIDTH) > FAR * WIDTH
-    return bool(tipped or abs(world.position[0, 0, 0] - exact) > FAR * WIDTH)
+    stop = min(time, SLIDING / pull) if pull > 0.0 else time
+    exact = SLIDING * stop - 0.5 * pull * stop**2
+    lifted = world.position[0, 0, 2] - SLAB[2]
+    return bool(max(abs(lifted), abs(world.position[0, 0, 0] - exact)) > FAR * 2.0 * SLAB[2])
 
 
 def _passes_through(speed: float, fidelity: Fidelity) -> float:

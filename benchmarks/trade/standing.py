@@ -1,7 +1,5 @@
 """Trials with stated criteria: towers, a heavy cube on a light tower, a cube in a gripper."""
 
-from typing import Any
-
 import numpy as np
 
 from benchmarks.trade.trial import Trace, Trial, Worlds
@@ -51,10 +49,8 @@ def grasp() -> Scene:
 
 
 def _close(worlds: Worlds) -> None:
-    """Our fingers get set points 1 cm inside the cube; the peer's press from the beginning."""
-    own: Any = worlds
-    if hasattr(own, "move_drives"):
-        own.move_drives([(0.0, -0.015, 0.2), (0.0, 0.015, 0.2)], 1e-3)
+    """The fingers get set points 1 cm inside the cube."""
+    worlds.move_drives([(0.0, -0.015, 0.2), (0.0, 0.015, 0.2)], 1e-3)
 
 
 def _slip(trace: Trace) -> float:

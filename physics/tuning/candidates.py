@@ -8,10 +8,10 @@ from typing import NamedTuple
 from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import touch_each_other
+from physics.tuning.motion import FRAME
 
 # substeps per frame of 40 ms: 1, then two or three values per octave up to 62.5 us
 COUNTS = (1, 2, 3, 4, 6, 8, 10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320, 448, 640)
-FRAME = 0.04  # s
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 _COLLISION_STEP = 0.01  # s, at most, between two regular broadphases, as in the presets
 

@@ -20,10 +20,9 @@ from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground
 from physics.tuning.candidates import can_touch
 from physics.tuning.description import code
+from physics.tuning.motion import side_by_side
 from physics.tuning.parts_cost import parts_cost
 
-_MANY = 32  # bodies beyond which a world isn't advanced with others side by side
-_WORLDS = 16  # side by side
 _KINDS = 6  # different bodies that are listed
 _PAIRS = 12  # different contacts that are listed
 
@@ -58,10 +57,10 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
     if costs:
-        many = len(scene.bodies) > _MANY
-        lines += ["", "Cost per substep of one world, one thread" if many else
-                  "Cost per substep of one of many worlds, one thread"]  # fmt: skip
-        lines += [f"  {line}" for line in _costs(scene, fidelity, 1 if many else _WORLDS)]
+        worlds = side_by_side(scene)
+        which = "world" if worlds == 1 else "of many worlds"
+        lines += ["", f"Cost per substep of one {which}, one thread"]
+        lines += [f"  {line}" for line in _costs(scene, fidelity, worlds)]
     return "\n".join(lines)
 
 

@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.compiler.jit import LANES
 from physics.errors import SimulationDiverged
+from physics.manybody.simulation import MANY
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.world import World
@@ -22,6 +24,14 @@ Control = Callable[[World, int], None]
 FRAME = 0.04  # s, a frame of the environments
 _MEASURED = 0.02  # s, shortest wall time whose measurement counts
 _REPEATS = 20  # at most, to reach it
+
+
+def side_by_side(scene: Scene) -> int:
+    """Number of worlds that the engine advances together: a lane group, or one of many bodies.
+
+    The cost of one of them is that of one of thousands.
+    """
+    return LANES if len(scene.bodies) < MANY else 1
 
 
 class Motion(NamedTuple):

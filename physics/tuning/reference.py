@@ -13,15 +13,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from physics.scene.fidelity import PRESETS, Fidelity
-from physics.tuning.candidates import FRAME, can_touch, with_substep
+from physics.tuning.candidates import can_touch, with_substep
 from physics.tuning.metrics import Metric
-from physics.tuning.motion import Course, Motion, simulate
+from physics.tuning.motion import FRAME, Course, Motion, simulate
 
 # substeps per frame: 0.25 ms first, then halved
 _FIRST, _LAST = 160, 5120
 # change by halving that counts as converged, as a fraction of the tolerance
 CONVERGED = 0.25
-_FINEST = 1e-12  # 1/s, tolerance of the adaptive integrator
 
 
 class Reference(NamedTuple):
@@ -63,6 +62,7 @@ def converged(
     """
     touches = can_touch(course.scene)
     base, spent = _fine(law, touches), 0.0
+    method = f"{law} law" if touches else "rk4"
     count, before, note = _FIRST, None, ""
     reference = Reference(None, math.inf, "", 0.0)
     while count <= _LAST:
@@ -75,9 +75,7 @@ def converged(
                 apart = metric.distance(before, found.motion)
                 within = apart <= tolerance
                 frames = len(apart) if within.all() else int(within.argmin())
-                text = f"{law} law, substep {1e3 * fidelity.substep:g} ms"
-                if not touches:
-                    text = f"rk4, substep {1e3 * fidelity.substep:g} ms"
+                text = f"{method}, substep {1e3 * fidelity.substep:g} ms"
                 horizon = max(frames - 1, 0) * course.frame
                 reference = Reference(found.motion, float(apart.max()), text, horizon)
                 if reference.uncertainty <= CONVERGED * tolerance:

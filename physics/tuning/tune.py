@@ -10,12 +10,9 @@ from physics.scene.validation import choice, instance, integer, positive
 from physics.tuning.candidates import families
 from physics.tuning.description import code
 from physics.tuning.metrics import METRICS, Metric
-from physics.tuning.motion import FRAME, Control, Course, Start, simulate
+from physics.tuning.motion import FRAME, Control, Course, Start, side_by_side, simulate
 from physics.tuning.reference import CONVERGED, Reference, find_reference
 
-# worlds side by side: one lane group of the engine, so that costs are those of many worlds
-_WORLDS = 16
-_MANY_BODIES = 32  # beyond it a world is not advanced with others side by side
 _BUDGET = 15.0  # s of wall time for the reference
 _TRIES = 40.0  # s of wall time for the fidelities, compilation not counted
 _SHOWN = 12  # rows of evidence that `str` prints
@@ -148,9 +145,7 @@ def tune(
     if law is not None:
         choice("law", law, LAWS)
     frames = max(1, round(positive("time", time) / FRAME))
-    if worlds is None:
-        worlds = _WORLDS if len(scene.bodies) <= _MANY_BODIES else 1
-    count = integer("worlds", worlds, low=1)
+    count = integer("worlds", side_by_side(scene) if worlds is None else worlds, low=1)
     course = Course(scene, frames, FRAME, count, start, control)
     say = progress or (lambda _: None)
     measure = METRICS[name]
@@ -164,7 +159,7 @@ def tune(
     evidence = _try_all(course, measure, reference, tolerance, exhaustive, say)
     good = [e for e in evidence if e.error <= tolerance]
     if not good:
-        least = min((e.error for e in evidence), default=math.inf)
+        least = min(e.error for e in evidence)
         reason = f"the smallest error of {len(evidence)} fidelities is {least:.2g} {measure.unit}"
         return Tuned(None, least, math.inf, evidence, reference, name, tolerance, reason.strip())
     best = min(good, key=lambda e: e.cost)
@@ -227,4 +222,4 @@ def _unknown(reference: Reference, metric: Metric, tolerance: float, time: float
         )
     else:
         until = "not even its first frame is known: tune with metric='penetration'"
-    return f"the motion is chaotic: {changes}; {until}"
+    return f"the motion is chaotic, or needs shorter steps than can be tried: {changes}; {until}"

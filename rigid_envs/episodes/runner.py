@@ -59,7 +59,12 @@ class Runner:
         observe_parameters: append the drawn parameters to the observation.
         observe_task_guide: append the task's guide to the observation, see `Task.guide`.
         **arguments: arguments of the task, if it is given by name or class.
+
+    Attributes:
+        measures_work: whether the worlds sum up the work of servos; a subclass can set it.
     """
+
+    measures_work = False
 
     def __init__(
         self,
@@ -135,8 +140,11 @@ class Runner:
         threads: int | None,
         per_world_parameters: bool,
     ) -> World:
-        """The worlds of the episodes; benchmarks overwrite it to measure more in them."""
-        return World(scene, fidelity, count, threads, per_world_parameters=per_world_parameters)
+        """The worlds of the episodes."""
+        return World(
+            scene, fidelity, count, threads, per_world_parameters=per_world_parameters,
+            measure_work=self.measures_work,
+        )  # fmt: skip
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
@@ -225,7 +233,7 @@ class Runner:
                 simulated. No state has changed then.
         """
         old, per_world = self.world, self.world.features.per_world_parameters
-        new = World(old.scene, fidelity, self.count, old.threads, per_world_parameters=per_world)
+        new = self._worlds(old.scene, fidelity, self.count, old.threads, per_world)
         if per_world:
             new.set_parameters(**old.parameters._asdict())
         new.set_state(
