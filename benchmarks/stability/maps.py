@@ -5,8 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from physics import Body, Box, Fidelity, Ground, Material, Scene, World
-from physics.reference.scenes import CUBE, block_on_ground, heavy_top, sphere_on_ground, tower
+from physics import Fidelity, Scene, World
+from physics.reference.scenes import (
+    CUBE,
+    block_on_ground,
+    heavy_top,
+    small_top,
+    sphere_on_ground,
+    tower,
+)
 
 WIDTH = 2.0 * CUBE.half_extents[2]  # m
 SLAB, SLIDING = (0.05, 0.05, 0.003), 1.0  # m, half extents; m/s
@@ -61,19 +68,6 @@ def _stiff(stiffness: float) -> Scene:
     )  # fmt: skip
 
 
-def _sizes(ratio: float) -> Scene:
-    """A small cube on a large one, of equal density."""
-    material, small = Material(0.5, 0.0), WIDTH / ratio
-    bodies = [
-        Body(CUBE, density=1000.0, position=(0, 0, 0.5 * WIDTH), material=material),
-        Body(
-            Box((0.5 * small,) * 3), density=1000.0, position=(0, 0, WIDTH + 0.5 * small),
-            material=material,
-        ),
-    ]  # fmt: skip
-    return Scene(bodies, [Ground(material)])
-
-
 def _hit(speed: float, restitution: float = 0.5) -> Scene:
     """A ball of 4 cm at a height of 5 cm, downwards."""
     radius = 0.5 * WIDTH
@@ -110,7 +104,7 @@ def _logarithmic(low: float, high: float, count: int) -> tuple[float, ...]:
 MAPS = (
     Map("stiffness, N/m", _logarithmic(1e2, 1e7, 16), _stiff, _moved),
     Map("mass ratio, upper to lower", _logarithmic(1.0, 1e4, 13), heavy_top, _moved),
-    Map("size ratio, lower to upper", _logarithmic(1.0, 16.0, 9), _sizes, _moved),
+    Map("size ratio, lower to upper", _logarithmic(1.0, 16.0, 9), small_top, _moved),
     Map(
         "speed of a ball, m/s", _logarithmic(0.1, 1e3, 17), _hit,
         _rebound(lambda _: 0.5, lambda v: v), 0.6, _passes_through,

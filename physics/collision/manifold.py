@@ -61,20 +61,22 @@ def _area(a, b, c, normal):
 
 
 @stage
-def _farthest(manifold, n, face, x, y, z, highest):
-    """Index of a face's point farthest from x y z, and the square of its distance.
+def _farthest(manifold, n, face, x, y, z, low, highest):
+    """Index of a face's point farthest from x y z, and its distance in m.
 
-    Only points whose separation is at most `highest`.
+    Only points whose separation is at most `highest`. What is higher than `low` counts as nearer by
+    that height: of two points above each other the lower one is the farther.
     """
     best, far = 0, -1.0
     for j in range(n):
         if manifold[j].face == face and manifold[j].separation <= highest:
             p = manifold[j].position
             dx, dy, dz = p[0] - x, p[1] - y, p[2] - z
-            square = dx * dx + dy * dy + dz * dz
+            distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+            distance = max(distance - max(manifold[j].separation - low, 0.0), 0.0)
             # of coinciding points always take the first
-            if square > far * (1.0 + 1e-6):
-                best, far = j, square
+            if distance > far * (1.0 + 1e-6):
+                best, far = j, distance
     return best, far
 
 
@@ -82,20 +84,22 @@ def _farthest(manifold, n, face, x, y, z, highest):
 def _span(manifold, n, face, deepest, deeper, x, y, z):
     """Four points of a face whose mean is x y z, fewer if they lie on a line; -1 for none."""
     low = manifold[deepest].separation + deeper
-    first, far = _farthest(manifold, n, face, x, y, z, low)
+    first, far = _farthest(manifold, n, face, x, y, z, low, low)
     p, normal = manifold[first].position, manifold[deepest].normal
-    second, far = _farthest(manifold, n, face, p[0], p[1], p[2], math.inf)
-    least = _SLIMMEST * far
+    second, far = _farthest(manifold, n, face, p[0], p[1], p[2], low, math.inf)
+    least = _SLIMMEST * far * far
     third, fourth, most, fewest = -1, -1, least, -least
     for j in range(n):
         if manifold[j].face == face:
             area = _area(manifold[first], manifold[second], manifold[j], normal)
-            if area > most * (1.0 + 1e-6):
-                third, most = j, area
-            if area < fewest * (1.0 + 1e-6):
-                fourth, fewest = j, area
+            # twice an area is `far` times a distance, which a height shortens as above
+            lost = far * max(manifold[j].separation - low, 0.0)
+            if area - lost > most * (1.0 + 1e-6):
+                third, most = j, area - lost
+            if area + lost < fewest * (1.0 + 1e-6):
+                fourth, fewest = j, area + lost
     if third < 0 and fourth < 0:  # the ends of an edge, both of them deep
-        second, far = _farthest(manifold, n, face, p[0], p[1], p[2], low)
+        second, far = _farthest(manifold, n, face, p[0], p[1], p[2], low, low)
     return first, second, third, fourth
 
 

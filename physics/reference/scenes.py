@@ -190,6 +190,16 @@ def heavy_top(ratio: float) -> Scene:
     return Scene(bodies, [Ground(material)])
 
 
+def small_top(ratio: float) -> Scene:
+    """Two stacked cubes of equal density: the lower one is `ratio` times as wide."""
+    material, half = Material(0.5, 0.0), CUBE.half_extents[0]
+    bodies = [
+        Body(Box((size,) * 3), density=1000.0, position=(0, 0, height), material=material)
+        for size, height in ((half, half), (half / ratio, 2.0 * half + half / ratio))
+    ]
+    return Scene(bodies, [Ground(material)])
+
+
 def dominoes(count: int, gap: float = 0.03) -> Scene:
     """A row of dominoes of 8 by 24 by 50 mm, of which the first one topples.
 

@@ -37,6 +37,17 @@ def test_a_cube_carries_one_many_times_as_dense(ratio, fidelity):
     assert world.position[0, 1, 2] > 0.058
 
 
+@pytest.mark.parametrize("ratio", [4.0, 8.0, 16.0])
+@pytest.mark.parametrize("substep", [2e-3, 0.5e-3])
+def test_a_small_cube_stands_on_a_wide_one(ratio, substep):
+    """All its samples are within the skin; those of its lower face must be the four that touch."""
+    world = World(scenes.small_top(ratio), replace(SOLID, substep=substep))
+    start = world.position[0, 1].copy()
+    world.advance(3.0)
+    assert np.abs(world.position[0, 1] - start).max() < 0.01 * 0.04 / ratio + 5e-5
+    assert np.abs(world.angular_velocity[0, 1]).max() < 1e-3
+
+
 def test_the_wave_along_dominoes_converges_with_the_step():
     """A single wave scatters by 4 %: small changes decide which edge of a stone touches first."""
 
