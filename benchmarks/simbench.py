@@ -6,20 +6,21 @@ elastic (elastic 666); 25 balls on a box that a force pushes diagonally (rolling
 own: mean square of the energy's error in J², mean over time of the sum of squared penetrations in
 m², mean square of the errors of velocity of box and ball in (m/s)². Published figures are the best
 of its engines (RaiSim, Bullet, ODE, MuJoCo, DART) at this step; they are of other machines, so
-their times are not compared.
+times are not compared. The tables are saved in benchmarks/results.json.
 """
 
 import argparse
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.report.provenance import describe, provenance
+from benchmarks.report.results_file import save
 from benchmarks.report.tables import Cell, Table, plain
+from benchmarks.trade.settings import milliseconds
 from physics import (
     PRESETS,
     Body,
@@ -48,13 +49,13 @@ class Bench(NamedTuple):
     Attributes:
         unit: of the error.
         published: the best published error at each step in s, and whose it is.
-        measure: error of a fidelity, and the wall time in s.
+        measure: error of a fidelity.
         settings: that are measured, by name.
     """
 
     unit: str
     published: dict[float, tuple[float, str]]
-    measure: Callable[[Fidelity], tuple[float, float]]
+    measure: Callable[[Fidelity], float]
     settings: dict[str, Fidelity]
 
 
@@ -95,22 +96,18 @@ def _rolling() -> Scene:
 
 
 def _run(scene: Scene, fidelity: Fidelity, time: float, error: Callable[[World], float],
-         before: Callable[[World], None] = lambda _: None) -> tuple[float, float]:  # fmt: skip
-    """Mean of an error over all steps, and the wall time of the steps alone."""
+         before: Callable[[World], None] = lambda _: None) -> float:  # fmt: skip
+    """Mean of an error over all steps."""
     world = World(scene, fidelity, allow_unstable=True)
-    step, found, spent = fidelity.substep, [], 0.0
-    world.advance(step)  # compiles
-    world.reset()
+    step, found = fidelity.substep, []
     for _ in range(round(time / step)):
         found.append(error(world))
         before(world)
-        begin = perf_counter()
         world.advance(step)
-        spent += perf_counter() - begin
-    return float(np.mean(found)), spent
+    return float(np.mean(found))
 
 
-def _energy_error(scene: Scene, time: float) -> Callable[[Fidelity], tuple[float, float]]:
+def _energy_error(scene: Scene, time: float) -> Callable[[Fidelity], float]:
     start = sum(MASS * 9.81 * body.position[2] for body in scene.bodies)
 
     def error(world: World) -> float:
@@ -119,7 +116,7 @@ def _energy_error(scene: Scene, time: float) -> Callable[[Fidelity], tuple[float
     return lambda fidelity: _run(scene, fidelity, time, error)
 
 
-def _penetration_error(fidelity: Fidelity) -> tuple[float, float]:
+def _penetration_error(fidelity: Fidelity) -> float:
     upper = np.triu_indices(216, 1)
 
     def error(world: World) -> float:
@@ -132,7 +129,7 @@ def _penetration_error(fidelity: Fidelity) -> tuple[float, float]:
     return _run(_heap(0.0, 0.101), fidelity, 10.0, error)
 
 
-def _rolling_error(fidelity: Fidelity) -> tuple[float, float]:
+def _rolling_error(fidelity: Fidelity) -> float:
     on_ground = GROUND_FRICTION * (10.0 + 25.0) * 9.81
     on_ball = (FORCE - on_ground) / 10.0 / (3.5 + 25.0 / 10.0)
     box, ball = (FORCE - on_ground - 25.0 * on_ball) / 10.0, on_ball
@@ -188,22 +185,22 @@ def rows(name: str) -> list[list[Cell]]:
     bench = BENCHES[name]
     found: list[list[Cell]] = []
     for step, (best, engine) in bench.published.items():
-        row: list[Cell] = [f"{name}, {1e3 * step:g} ms", best, engine]
-        least, which, took = math.inf, "", math.nan
+        least, which = math.inf, ""
         for setting, fidelity in bench.settings.items():
             try:
-                error, seconds = bench.measure(replace(fidelity, substep=step))
+                error = bench.measure(replace(fidelity, substep=step))
             except (ValueError, SimulationDiverged):
                 continue
             if error < least:
-                least, which, took = error, setting, seconds
-        found.append([*row, least, which, "yes" if least <= best else "no", took])
-        print(*found[-1], flush=True)
+                least, which = error, setting
+        ours = f"{least:.3g}" if which else "diverged"
+        found.append([milliseconds(step), f"{best:.3g}", engine, ours, which])
+        print(name, *found[-1], flush=True)
     return found
 
 
 def main() -> None:
-    """Prints a table."""
+    """Prints and saves a table for each scene."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.simbench", description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -212,11 +209,14 @@ def main() -> None:
     names = parser.parse_args().scenes or list(BENCHES)
     if unknown := [name for name in names if name not in BENCHES]:
         parser.error(f"unknown scene: {', '.join(unknown)}; known: {', '.join(BENCHES)}")
-    print(describe(provenance()))
-    columns = ["scene, step", "best published", "engine", "our error", "setting", "no worse"]
-    columns += ["s"]
-    table = [row for name in names for row in rows(name)]
-    print(plain(Table("simbench", "Errors at equal steps", columns, table)))
+    this_run = provenance()
+    print(describe(this_run))
+    for name in names:
+        unit = BENCHES[name].unit
+        columns = ["step", f"best published, {unit}", "by", f"ours, {unit}", "with"]
+        table = Table(f"simbench {name}", f"SimBenchmark, {name}", columns, rows(name))
+        print(plain(table) + "\n", flush=True)
+        save([table], this_run, keep=True)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ Scenes: one or two bodies, boxes or balls of 1 to 5 cm with densities of 200 to 
 3 cm above the ground, at up to 1 m/s along it; friction 0.2 to 0.9, restitution 0 to 0.6, both for
 all solids. 0.6 s are simulated; the tolerance is 1, 3 or 10 mm. The sweep measures every fidelity
 that tune knows, against the same kind of reference. The ratio is the cost of tune's choice over
-that of the cheapest one within the tolerance, both as the sweep measured them.
+that of the cheapest one within the tolerance, both as the sweep measured them. The table is saved
+in benchmarks/results.json.
 """
 
 import argparse
@@ -14,6 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.report.provenance import describe, provenance
+from benchmarks.report.results_file import save
 from benchmarks.report.tables import Cell, Table, plain
 from physics import Body, Box, Ground, Material, Scene, Sphere, tune
 
@@ -63,20 +65,23 @@ def compare(seed: int) -> list[Cell]:
 
 
 def main() -> None:
-    """Prints a row per scene."""
+    """Prints a row per scene, and saves them."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.tuning", description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("--scenes", type=int, default=SCENES)
     count = parser.parse_args().scenes
-    print(describe(provenance()))
+    this_run = provenance()
+    print(describe(this_run))
     rows = []
     for seed in range(count):
         rows.append(compare(seed))
         print(*rows[-1], flush=True)
     columns = ["seed", "bodies", "tolerance, m", "cost / cheapest", "error, m", "s", "none because"]
-    print(plain(Table("tuning", f"tune on {count} random scenes", columns, rows)))
+    table = Table("tuning", f"tune on {count} random scenes", columns, rows)
+    print(plain(table))
+    save([table], this_run, keep=True)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ from benchmarks.pages import PAGES, page_text
 from benchmarks.plots import PLOTS, TASKS
 from benchmarks.report.results_file import load, save
 from benchmarks.report.tables import Table
+from benchmarks.stability.__main__ import load as cells
+from benchmarks.stability.summary import ranges
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -56,3 +58,8 @@ def test_a_difference_names_the_first_step_and_the_largest_number():
     assert difference(own, {**own, "end": ~own["end"]}) == (1.0, 0)
     assert difference(own, {**own, "x": -own["x"]}) == (0.0, 0)  # the sign of zero is a bit too
     assert difference(own, {**own, "x": own["x"][:2]}) == (np.inf, 0)
+
+
+def test_the_table_of_stability_is_that_of_the_map():
+    table = load().tables["stability"]
+    assert table == ranges(cells())

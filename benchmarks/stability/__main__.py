@@ -1,11 +1,12 @@
 """Maps of stability: python -m benchmarks.stability [--settings balanced ...].
 
-For each preset, with other substeps: a run is stable; it drifted, if a body isn't where it belongs
-(10 % of its width, 5 % of a rebound); it diverged, if it isn't finite or its energy grows by more
-than a tenth; it is refused, if a World doesn't accept the substep. What is refused is simulated,
-too, with allow_unstable=True. Line: the substep from which on it is refused, or with which theory
-expects trouble. Writes docs/trade/stability.csv and a picture for each setting; it resumes from
-the CSV.
+For each preset, with its substep and others: a run is stable; it drifted, if a body isn't where it
+belongs (10 % of its width, 5 % of a rebound); it diverged, if it isn't finite or its energy grows
+by more than a tenth; it is refused, if a World doesn't accept the substep. What is refused is
+simulated, too, with allow_unstable=True. Line: the substep from which on it is refused, or with
+which theory expects trouble. Writes docs/trade/stability.csv and a picture for each setting, and
+saves a table in benchmarks/results.json; it resumes from the CSV. With another CSV, nothing is
+saved elsewhere.
 """
 
 import argparse
@@ -17,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.report.provenance import ROOT, describe, provenance
+from benchmarks.report.results_file import save
 from benchmarks.stability.maps import MAPS, Map, at
+from benchmarks.stability.summary import ranges
 from physics import PRESETS, Fidelity, Scene, SimulationDiverged, World
 
 PATH = ROOT / "docs" / "trade" / "stability.csv"
@@ -83,14 +86,15 @@ def refused(scene: Scene, fidelity: Fidelity) -> bool:
 def measured(setting: str, chosen: Map) -> Iterator[Cell]:
     """All runs of a map."""
     base = PRESETS[setting]
+    substeps = sorted({*SUBSTEPS, base.substep})
     for value in chosen.values:
         scene = chosen.scene(value)
-        no = [refused(scene, at(base, h)) for h in SUBSTEPS]
-        accepted = [h for h, r in zip(SUBSTEPS, no, strict=True) if not r]
-        limit = max(accepted, default=SUBSTEPS[0]) if any(no) else 0.0
+        no = [refused(scene, at(base, h)) for h in substeps]
+        accepted = [h for h, r in zip(substeps, no, strict=True) if not r]
+        limit = max(accepted, default=substeps[0]) if any(no) else 0.0
         if chosen.limit is not None:
             limit = chosen.limit(value, base)
-        for h, r in zip(SUBSTEPS, no, strict=True):
+        for h, r in zip(substeps, no, strict=True):
             found = outcome(scene, chosen, value, at(base, h))
             yield Cell(setting, chosen.name, value, h, found, int(r), limit)
 
@@ -129,7 +133,8 @@ def main() -> None:
     parser.add_argument("--settings", nargs="+", choices=list(PRESETS), default=list(PRESETS))
     parser.add_argument("--data", type=Path, default=PATH, metavar="CSV")
     options = parser.parse_args()
-    print(describe(provenance()))
+    this_run = provenance()
+    print(describe(this_run))
     done = {(cell.setting, cell.map) for cell in load(options.data)}
     for setting in options.settings:
         for chosen in MAPS:
@@ -141,6 +146,8 @@ def main() -> None:
             print(setting, chosen.name, counts, flush=True)
     for path in stability.draw_all(load(options.data), options.data.parent):
         print(f"written: {path}")
+    if options.data == PATH:
+        save([ranges(load())], this_run, keep=True)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from physics.reference.scenes import (
 )
 
 WIDTH = 2.0 * CUBE.half_extents[2]  # m
-SLAB, SLIDING = (0.05, 0.05, 0.003), 1.0  # m, half extents; m/s
+SLAB, SLIDING = (0.05, 0.05, 0.004), 1.0  # m, half extents; m/s
 # of a body's width: how far it may move from where it belongs
 FAR = 0.1
 # of e, and of the kinetic energy
