@@ -14,6 +14,7 @@ from physics.analysis.integrator_limits import check_integrator
 from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.solids import Solids
+from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import check_step
 from physics.analysis.work_limits import check_work
 from physics.granular.queries import GranularQueries
@@ -56,8 +57,8 @@ class World:
         TypeError: an argument of the wrong type.
         ValueError: an argument out of range; a substep that is too long for the scene, see
             `physics.analysis.step_limits.check_step`; an integrator that can't advance it, see
-            `physics.analysis.integrator_limits.check_integrator`; `measure_work` where it is not
-            supported.
+            `physics.analysis.integrator_limits.check_integrator`; a solver that can't solve it, see
+            `physics.analysis.solver_limits.check_solver`; `measure_work` where it is not supported.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class World:
         self._simulation: Simulation
         self._queries: LaneQueries | CrowdQueries | GranularQueries
         crowd = is_crowd(scene, self.fidelity, per_world_parameters)
+        check_solver(scene, self.fidelity, crowd)
         if measure_work:
             check_work(scene, self.fidelity, crowd)
         if crowd and not supports(scene, self.fidelity):

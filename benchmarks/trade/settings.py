@@ -57,6 +57,8 @@ _CONTACT_CURVES: dict[str, Fidelity] = {
     "impulses": _IMPULSE,
     "impulses, softer": replace(_IMPULSE, contact_resolution=1.0),
     "impulses, particles": replace(_IMPULSE, geometry="particle"),
+    "impulses, Newton": replace(_IMPULSE, solver="newton", contact_resolution=50.0),
+    "impulses, Newton, stiffer": replace(_IMPULSE, solver="newton", contact_resolution=100.0),
     "impulses, bisection": replace(_IMPULSE, time_control="bisection"),
     "impulses, advancement": replace(_IMPULSE, time_control="advancement"),
     "impulses, swept": replace(_IMPULSE, time_control="swept"),

@@ -18,9 +18,11 @@ from physics.model.lanes import count_slots
 from physics.model.state import STARTS_ANEW
 from physics.scene.shapes import PLANE
 
-# fraction of the skin; a list with less than that left is renewed when a collision step starts, in
-# all lanes at once rather than one by one within it
+# fraction of what is left after a search; a list with less than that is renewed when a collision
+# step starts, in all lanes at once rather than one by one within it
 RENEWAL = 0.5
+# fraction of the skin by which two faces may shift before their four points are chosen anew
+SHIFT = 0.1
 
 
 @cached_by_features
@@ -61,13 +63,23 @@ def make_search_half_pair(features):
                 if reverse >= 0:
                     first_point = live.count[i]
                     search(model, state, workspace, g, reverse, i, back, first_point, motion)
-                if impulse:
-                    reduce_manifold(model, state, workspace, g, k, i)
+                if impulse and reduce_manifold(model, state, workspace, g, k, i) and reverse >= 0:
+                    # the four can slip off the edge of the other face
+                    most = SHIFT * at(half_pair.skin, i)
+                    live.remaining_skin[i] = min(live.remaining_skin[i], most)
+                    reverse_live = workspace.half_pair[reverse]
+                    reverse_live.remaining_skin[i] = min(reverse_live.remaining_skin[i], most)
         count_slots(workspace, k)
         if reverse >= 0:
             count_slots(workspace, reverse)
 
     return search_half_pair
+
+
+@stage
+def renewal(half_pair, impulse):
+    """Fraction of the skin with less of which a list is renewed when a collision step starts."""
+    return RENEWAL * SHIFT if impulse and half_pair.reverse >= 0 else RENEWAL
 
 
 @stage
@@ -103,13 +115,13 @@ def make_broadphase(features):
     The first substep of a collision step also replaces lists with less than half of their skin. The
     first collision step of a call of `advance` does not.
     """
-    search_half_pair = make_search_half_pair(features)
+    search_half_pair, impulse = make_search_half_pair(features), features.impulse
 
     @stage
     def broadphase(model, state, workspace, g, starts_collision_step):
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
-            least = RENEWAL if starts_collision_step else 0.0
+            least = renewal(half_pair, impulse) if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
             exhausted = spend_skin(owner, surface, half_pair, live, least)
             if exhausted > 0:

@@ -2,8 +2,8 @@
 
 Sequential impulses need more sweeps, and make towers sway, the more points share a load. So of all
 candidates of a pair that would touch on the same face, from both half-pairs, only four stay: those
-that span the largest patch. They carry the weight of all. They are chosen when lists are replaced;
-until then another sample can get as deep as the skin is wide, if a body rotates about the four.
+that span the largest patch. They carry the weight of all. They are chosen when lists are replaced,
+which is early: after a shift of a tenth of the skin one of them may be off the other face.
 A mesh keeps all its candidates: its round sides have many samples nearly in a plane, and on four
 that span it, but are not the deepest, it would rock without end.
 """
@@ -180,11 +180,12 @@ def make_manifold_reduction(features, clear):
 
     @stage
     def reduce_manifold(model, state, workspace, g, k, i):
+        """Reduces the lists of lane i; whether any candidate was dropped."""
         half_pair = model.half_pair[k]
         if half_pair.kind == PARTICLES:
-            return
+            return False
         if mesh and half_pair.keeps_all != 0:
-            return
+            return False
         reverse, manifold = half_pair.reverse, workspace.manifold
         count = workspace.half_pair[k].count[i]
         others = workspace.half_pair[reverse].count[i] if reverse >= 0 else 0
@@ -193,7 +194,7 @@ def make_manifold_reduction(features, clear):
                 manifold[j].normal[axis] = -manifold[j].normal[axis]
         n = count + others
         if n <= 4:
-            return
+            return False
         for j in range(n):
             s, slot = (k, j) if j < count else (reverse, j - count)
             manifold[j].weight = state.candidate[g, model.half_pair[s].first_slot + slot].weight[i]
@@ -206,5 +207,8 @@ def make_manifold_reduction(features, clear):
         drop(model, state, workspace, g, k, i, manifold[:count])
         if reverse >= 0:
             drop(model, state, workspace, g, reverse, i, manifold[count:n])
+        left = workspace.half_pair[k].count[i]
+        left += workspace.half_pair[reverse].count[i] if reverse >= 0 else 0
+        return left < n
 
     return reduce_manifold

@@ -13,6 +13,9 @@ and the normal n out of the surface, a substep
    that pushing overlapping bodies apart has given them;
 3. applies the other forces and the first guess, then solves u n >= -separation/h for bodies that
    are apart and the soft contact of `sweep.py` for those that overlap.
+
+With Fidelity.solver="newton", `newton.py` solves step 3 for all contacts of a world at once, and
+the relaxation is left out where nothing separates.
 """
 
 from physics.compiler.jit import LANES, at, sequence, stage
@@ -23,6 +26,7 @@ from physics.constraints.joint_velocities import (
     make_hold,
 )
 from physics.impulse.contact_rows import make_contact_rows
+from physics.impulse.newton import find_separating, make_newton
 from physics.impulse.point_impulses import (
     add_opposite,
     apply_angular_impulse,
@@ -173,7 +177,8 @@ def make_impulses(features):
     contact_rows, impacts = make_contact_rows(features), make_impacts(features)
     sweep, warm_start = make_sweep(features), make_warm_start(features)
     store_forces, find_all_impacts = make_store_forces(features), make_find_all_impacts(features)
-    joints = features.joints
+    joints, solves_together = features.joints, features.newton
+    newton = make_newton(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
@@ -184,7 +189,8 @@ def make_impulses(features):
     def sweep_all(model, workspace, h, soft):
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
-                sweep(operands_of(model, workspace, k), model.half_pair[k], h, soft)
+                moves = workspace.search[0].moves
+                sweep(operands_of(model, workspace, k), model.half_pair[k], h, soft, moves)
                 couple_finger_velocities(model, workspace)
         lane = workspace.lane[0]
         hold(model, workspace, lane.in_contact, h if soft else 0.0, lane)
@@ -235,14 +241,16 @@ def make_impulses(features):
         apply_known_forces(model, workspace, -lag * drifted)
         clear_hold(model, workspace)
         begin_hold(model, workspace, False, 0.0)
-        sweep_all(model, workspace, h, False)
+        if not solves_together or find_separating(model, workspace) > 0:
+            sweep_all(model, workspace, h, False)
         apply_known_forces(model, workspace, h)
         begin_hold(model, workspace, True, h)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
                 warm_start(operands_of(model, workspace, k))
         couple_finger_velocities(model, workspace)
-        sweep_all(model, workspace, h, True)
+        if not solves_together or newton(model, workspace, h) > 0:
+            sweep_all(model, workspace, h, True)
         end_hold(model, workspace, h)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:

@@ -31,6 +31,26 @@ ANCHOR_DECAY = 0.1
 
 
 @stage
+def soft_response(stiffness, damping, h, weight):
+    """The response a in kg of a soft contact, and the rate in 1/s at which its overlap closes."""
+    rigid = damping + h * stiffness
+    return h * weight * rigid, stiffness / rigid
+
+
+@stage
+def target_approach(separation, rate, per_h):
+    """m/s: -u n at which a contact gives no impulse."""
+    overlapping = max(rate * separation, -MAX_PUSH_OUT_SPEED)
+    return separation * per_h if separation > 0.0 else overlapping
+
+
+@stage
+def anchor_kept(h, slides):
+    """Factor of an anchor in a step."""
+    return 0.0 if slides else 1.0 - h * ANCHOR_DECAY
+
+
+@stage
 def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
     """Corrects the angular impulse of a point against rolling and spinning."""
     owner, surface, A, B = pair.owner[0], pair.surface[0], pair.A, pair.B
@@ -60,21 +80,24 @@ def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
 def make_sweep(features):
     """Stage that corrects the impulses of a half-pair's points, one after another."""
     friction, resistance = features.friction, features.resistance
+    newton = features.newton
 
     @stage
-    def sweep(pair, constants, h, soft):
-        """`soft`: with the bias that pushes overlapping bodies apart, by soft contacts."""
+    def sweep(pair, constants, h, soft, moves):
+        """`soft`: with the bias that pushes overlapping bodies apart, by soft contacts.
+
+        With Newton's method only worlds with `moves` are corrected.
+        """
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
         frictions, floors = constants.friction, constants.rest_speed
-        stiffness, damping = constants.stiffness, constants.damping
+        stiffness, damping = constants.sweep_stiffness, constants.sweep_damping
         rolling, spinning = constants.rolling, constants.spinning
         per_h = 1.0 / h
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
                 mu, floor = at(frictions, i), at(floors, i)
-                K, C = at(stiffness, i), at(damping, i)
-                rate = K / (C + h * K)
+                a, rate = soft_response(at(stiffness, i), at(damping, i), h, point.weight[i])
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 separation, weight = point.separation[i], point.weight[i]
                 m, before = point.mass[i], point.normal_impulse[i]
@@ -84,15 +107,16 @@ def make_sweep(features):
                 bias = separation * per_h if apart else 0.0
                 mass, leak = m, 0.0
                 if soft:
-                    a = h * weight * (C + h * K)
                     yields = not apart
                     leak = m / (m + a) if yields else 0.0
                     mass = a * leak if yields else m
-                    bias = max(rate * separation, -MAX_PUSH_OUT_SPEED) if yields else bias
+                    bias = target_approach(separation, rate, per_h)
                 # what is about to collide must arrive at its full speed
                 bias = -un if apart & (un < -floor) else bias
                 new = max(before - mass * (un + bias) - leak * before, 0.0)
                 new = new if weight > 0.0 else 0.0
+                if newton:
+                    new = new if moves[i] != 0 else before
                 step = new - before
                 point.normal_impulse[i] = new
                 apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
@@ -114,11 +138,17 @@ def make_sweep(features):
                     qx *= cut
                     qy *= cut
                     qz *= cut
+                    if newton:
+                        qx = qx if moves[i] != 0 else px
+                        qy = qy if moves[i] != 0 else py
+                        qz = qz if moves[i] != 0 else pz
                     tangential[0, i] = qx
                     tangential[1, i] = qy
                     tangential[2, i] = qz
                     if soft:
-                        held = 1.0 - h * ANCHOR_DECAY if size <= limit else 0.0
+                        held = anchor_kept(h, size > limit)
+                        if newton:
+                            held = held if moves[i] != 0 else 1.0
                         anchor[0, i] *= held
                         anchor[1, i] *= held
                         anchor[2, i] *= held

@@ -4,7 +4,7 @@ What a half-pair needs of its two solids is copied from `Crowd.frame` into two r
 memory, one lane per pair. Then the stages for worlds side by side do the rest.
 """
 
-from physics.collision.broadphase import RENEWAL, make_search_half_pair, spend_skin
+from physics.collision.broadphase import make_search_half_pair, renewal, spend_skin
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.jit import LANES, sequence, stage
 from physics.manybody.tables import (
@@ -65,6 +65,11 @@ def workspace_of(workspace, pairs, kind, b, rows, first_row, row_count):
         workspace.clock,
         workspace.kept,
         workspace.servo,
+        workspace.response_row,
+        workspace.block,
+        workspace.block_vector,
+        workspace.contact_sum,
+        workspace.search,
     )
 
 
@@ -161,7 +166,7 @@ def make_find_candidates(features):
     """
     search_half_pair = make_search_half_pair(features)
     compound_frames = make_compound_frames(features)
-    compound = features.compound
+    compound, impulse = features.compound, features.impulse
 
     @sequence
     def find_candidates(model, state, workspace, crowd, pairs, b, starts_collision_step):
@@ -169,10 +174,10 @@ def make_find_candidates(features):
         one, two = workspace.solid[0], workspace.solid[1]
         gather_motion(crowd.frame, first, one)
         gather_motion(crowd.frame, second, two)
-        least = RENEWAL if starts_collision_step else 0.0
         exhausted = 0
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
+            least = renewal(half_pair, impulse) if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
             exhausted += spend_skin(owner, surface, half_pair, live, least)
         if exhausted == 0 and not has_candidates(workspace):
@@ -186,7 +191,8 @@ def make_find_candidates(features):
         compound_frames(model, workspace)
         if exhausted > 0:
             for k in range(model.half_pair.shape[0]):
-                search_half_pair(model, state, workspace, 0, k, least)
+                renewed = renewal(model.half_pair[k], impulse) if starts_collision_step else 0.0
+                search_half_pair(model, state, workspace, 0, k, renewed)
         return has_candidates(workspace)
 
     return find_candidates

@@ -75,6 +75,11 @@ def group_workspace(workspace, crowd, g):
         workspace.clock,
         crowd.kept[:, group.first_block : group.first_block + group.solid_count],
         workspace.servo,
+        workspace.response_row,
+        workspace.block,
+        workspace.block_vector,
+        workspace.contact_sum,
+        workspace.search,
     )
 
 

@@ -324,7 +324,8 @@ def make_sweep_batch(features):
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
-                sweep(operands_of(model, mine, k), model.half_pair[k], h, soft)
+                moves = mine.search[0].moves
+                sweep(operands_of(model, mine, k), model.half_pair[k], h, soft, moves)
         scatter_speeds(crowd, pairs, b, workspace)
         return 0
 

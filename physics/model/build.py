@@ -296,4 +296,5 @@ def _features(
         compound=len(model.compound_part) > 0,
         per_world_parameters=per_world_parameters,
         time_control=TIME_CONTROLS.index(fidelity.time_control) if len(model.half_pair) else FIXED,
+        newton=impulse and fidelity.solver == "newton",
     )

@@ -28,6 +28,10 @@ _CUBE_ROCKING = 9.0 / 8.0
 _SLIM_RESTITUTION = 0.24
 # Impulse law: damping ratio of a soft contact
 SOFT_DAMPING = 1.0
+# Newton's method: fraction of an overlap that closes in a step
+CLOSING = 0.3
+# of the sweeps in steps that Newton's method doesn't solve: omega h, as in the preset "solid"
+SWEEP_RESOLUTION = 1.8
 # Impulse law: number of steps of free fall whose speed counts as rest
 REST_STEPS = 4.0
 
@@ -114,7 +118,11 @@ def contact_columns(
         h,
     )
     if fidelity.law == "impulse":
-        damping = 2.0 * SOFT_DAMPING * np.sqrt(stiffness * pair_mass)
+        softest = pair_mass * (SWEEP_RESOLUTION / h) ** 2 * soft
+        newton = fidelity.solver == "newton"
+        sweep_stiffness = np.minimum(stiffness, softest) if newton else stiffness
+        sweep_damping = 2.0 * SOFT_DAMPING * np.sqrt(sweep_stiffness * pair_mass)
+        damping = stiffness * h * (1.0 / CLOSING - 1.0) if newton else sweep_damping
         damping_error = np.zeros(stiffness.shape)
         slowest = np.full(stiffness.shape, REST_STEPS * g * h)
     else:
@@ -122,10 +130,13 @@ def contact_columns(
         reached = np.maximum(restitution, floor)
         damping = damping_coefficients(reached, fidelity.damping)
         damping_error = damping_errors(reached, damping, fidelity.damping)
+        sweep_stiffness, sweep_damping = stiffness, np.zeros(stiffness.shape)
         slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
     return {
         "stiffness": stiffness,
         "damping": damping,
+        "sweep_stiffness": sweep_stiffness,
+        "sweep_damping": sweep_damping,
         "damping_error": damping_error,
         "restitution": restitution,
         "rest_speed": slowest,

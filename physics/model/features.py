@@ -45,6 +45,7 @@ class Features(NamedTuple):
         per_world_parameters: masses, materials and sizes can differ between worlds.
         time_control: FIXED, HALVED, BISECTION, ADVANCEMENT or SWEPT.
         measures_work: the work of the servos is summed up, see `World.drive_work`.
+        newton: impulses of all contacts are solved together.
     """
 
     integrator: int
@@ -76,6 +77,7 @@ class Features(NamedTuple):
     per_world_parameters: bool
     time_control: int = FIXED
     measures_work: bool = False
+    newton: bool = False
 
     @property
     def finds_impacts(self) -> bool:

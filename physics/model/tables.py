@@ -75,6 +75,9 @@ HALF_PAIR = np.dtype(
         ("impact_tolerance", "f8"),
         ("stiffness", "f8"),  # N/m of a whole face
         ("damping", "f8"),  # coefficient of the law
+        # impulse law, of the soft contacts of sweeps: N/m and N s/m
+        ("sweep_stiffness", "f8"),
+        ("sweep_damping", "f8"),
         ("damping_error", "f8"),  # relative, per (omega h)^2, see normal_damping.py
         ("restitution", "f8"),
         ("rest_speed", "f8"),  # m/s, lower bound of the impact speed
@@ -107,6 +110,8 @@ HALF_PAIR_PER_WORLD = (
     "free_motion",
     "stiffness",
     "damping",
+    "sweep_stiffness",
+    "sweep_damping",
     "damping_error",
     "restitution",
     "rest_speed",

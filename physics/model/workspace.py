@@ -116,6 +116,52 @@ CONTACT_ROW = np.dtype(
     align=True,
 )
 
+# one row per slot, of Newton's method; vectors in the world frame
+RESPONSE_ROW = np.dtype(
+    [
+        ("pressing", "f8", (LANES,)),  # kg, response along the normal while it presses
+        ("sticking", "f8", (LANES,)),  # kg, response across it while it sticks
+        ("limit", "f8", (LANES,)),  # N s, of friction
+        ("approach", "f8", (LANES,)),  # m/s, below zero the contact presses
+        ("slip", "f8", (3, LANES)),  # m/s
+        ("along", "f8", (LANES,)),  # kg, response along the normal at this velocity
+        ("across", "f8", (LANES,)),  # kg, across it
+        ("change", "f8", (3, LANES)),  # N s: what is lacking, then what the solution adds
+        ("velocity_change", "f8", (3, LANES)),  # m/s, by the solution
+        ("kept_normal", "f8", (LANES,)),  # N s, before the first iteration
+        ("kept_tangential", "f8", (3, LANES)),  # N s, likewise
+    ],
+    align=True,
+)
+
+# one row per block of the matrix of Newton's method, on or below the diagonal
+BLOCK = np.dtype([("entry", "f8", (9 * LANES,)), ("used", "i8")], align=True)
+# one row per row of blocks: right side, then solution
+BLOCK_VECTOR = np.dtype([("component", "f8", (3, LANES))], align=True)
+# sums over the contacts of a half-pair, see impulse/contact_matrix.py
+CONTACT_SUM = np.dtype([("entry", "f8", (9 * LANES,))], align=True)
+CONTACT_SUMS = 8
+
+# a single row
+SEARCH = np.dtype(
+    [
+        ("moves", "i8", (LANES,)),  # 1: sweeps correct the impulses of this world
+        ("unsolved", "i8", (LANES,)),
+        ("deep", "i8", (LANES,)),  # 1: an overlap is deeper than the rounding of edges
+        ("lacking", "f8", (LANES,)),  # (N s)^2, sum over contacts
+        ("off", "f8", (LANES,)),  # (N s)^2, likewise of what a sweep would change
+        ("scale", "f8", (LANES,)),  # (N s)^2, sum of squares of normal impulses
+        ("part", "f8", (LANES,)),  # of the solution that is taken, see impulse/newton_step.py
+        ("slope", "f8", (LANES,)),  # J, of the energy there
+        ("steepest", "f8", (LANES,)),  # J, minus that at the start
+        ("low", "f8", (LANES,)),  # the part is between these two
+        ("high", "f8", (LANES,)),
+        ("low_slope", "f8", (LANES,)),  # J
+        ("high_slope", "f8", (LANES,)),
+    ],
+    align=True,
+)
+
 # one row per solid
 TENSOR = np.dtype([("component", "f8", (6, LANES))], align=True)  # 1/(kg m^2): xx yy zz xy xz yz
 
@@ -298,6 +344,11 @@ class Workspace(NamedTuple):
         clock: [1] of CLOCK; time control.
         kept: [4, solids] of SOLID, see BEGINNING; time control.
         servo: [dynamic bodies] of SERVO_WORK, where the work of servos is measured.
+        response_row: [slots] of RESPONSE_ROW; Newton's method, as the next three.
+        block: [entries of a triangle of two rows per body] of BLOCK, row by row.
+        block_vector: [two per solid] of BLOCK_VECTOR; zero for those that aren't bodies.
+        contact_sum: [CONTACT_SUMS] of CONTACT_SUM.
+        search: [1] of SEARCH.
     """
 
     solid: Array
@@ -319,6 +370,11 @@ class Workspace(NamedTuple):
     clock: Array
     kept: Array
     servo: Array
+    response_row: Array
+    block: Array
+    block_vector: Array
+    contact_sum: Array
+    search: Array
 
     @classmethod
     def of(cls, model: Model, features: Features) -> "Workspace":
@@ -330,6 +386,8 @@ class Workspace(NamedTuple):
         slots = int(half_pair["slot_count"].sum())
         joints, rows = int(features.joints), model.joint_row
         entries = int((np.arange(len(rows)) - rows["first"]).sum())
+        newton = features.newton
+        blocks = 2 * int(model.dynamic["is_body"].sum()) if newton else 0
         kept = 0 if features.time_control == FIXED else 4
         work = aligned_zeros(len(half_pair), HALF_PAIR_WORK)
         work["first_row"] = half_pair["first_slot"]
@@ -353,4 +411,9 @@ class Workspace(NamedTuple):
             clock=aligned_zeros(1, CLOCK),
             kept=aligned_zeros((kept, solids), SOLID),
             servo=aligned_zeros(len(model.dynamic) if features.measures_work else 0, SERVO_WORK),
+            response_row=aligned_zeros(slots if newton else 0, RESPONSE_ROW),
+            block=aligned_zeros(blocks * (blocks + 1) // 2, BLOCK),
+            block_vector=aligned_zeros(2 * solids if newton else 0, BLOCK_VECTOR),
+            contact_sum=aligned_zeros(CONTACT_SUMS if newton else 0, CONTACT_SUM),
+            search=aligned_zeros(1, SEARCH),
         )

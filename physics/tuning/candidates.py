@@ -60,6 +60,7 @@ def families(scene: Scene) -> Iterator[Family]:
             "impulses, spacing 1": replace(impulse, spacing=1.0),
             "impulses, 1 rad per step": replace(impulse, contact_resolution=1.0),
             "impulses, swept": replace(impulse, time_control="swept"),
+            "impulses, Newton": replace(impulse, solver="newton", contact_resolution=50.0),
         }
     else:
         bases = {

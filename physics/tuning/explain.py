@@ -10,7 +10,9 @@ import numpy as np
 from physics.analysis import stability
 from physics.analysis.field_limits import longest_step
 from physics.analysis.integrator_limits import check_integrator
+from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import check_step
+from physics.manybody.simulation import is_crowd
 from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features
 from physics.model.tables import Model
@@ -90,6 +92,10 @@ def _modelled(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[
             geometry = "spheres against spheres"
         if fidelity.law == "impulse":
             yield f"contacts: impulses that stop approach, {geometry}; restitution is exact"
+            if features.newton:
+                yield "solver: Newton's method, for all contacts of a world together"
+            else:
+                yield "solver: one Gauss-Seidel sweep per substep, contact after contact"
         elif fidelity.damping == "hunt_crossley":
             yield f"contacts: springs with Hunt-Crossley damping, {geometry}"
         else:
@@ -173,6 +179,7 @@ def _steps(
         if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
             yield "shorter substeps make contacts stiffer: no material gives a stiffness"
     try:
+        check_solver(scene, fidelity, is_crowd(scene, fidelity, False))
         check_integrator(few, fidelity, model)
         check_step(few, fidelity, model, features)
     except ValueError as error:
