@@ -18,11 +18,9 @@ from physics.model.lanes import count_slots
 from physics.model.state import STARTS_ANEW
 from physics.scene.shapes import PLANE
 
-# fraction of what is left after a search; a list with less than that is renewed when a collision
-# step starts, in all lanes at once rather than one by one within it
+# fraction of the skin; a list with less than that left is renewed when a collision step starts, in
+# all lanes at once rather than one by one within it
 RENEWAL = 0.5
-# fraction of the skin by which two faces may shift before their four points are chosen anew
-SHIFT = 0.1
 
 
 @cached_by_features
@@ -64,8 +62,8 @@ def make_search_half_pair(features):
                     first_point = live.count[i]
                     search(model, state, workspace, g, reverse, i, back, first_point, motion)
                 if impulse and reduce_manifold(model, state, workspace, g, k, i) and reverse >= 0:
-                    # the four can slip off the edge of the other face
-                    most = SHIFT * at(half_pair.skin, i)
+                    # as far as a point that slips off the other face is still on its round edge
+                    most = 0.5 * at(half_pair.radius, i)
                     live.remaining_skin[i] = min(live.remaining_skin[i], most)
                     reverse_live = workspace.half_pair[reverse]
                     reverse_live.remaining_skin[i] = min(reverse_live.remaining_skin[i], most)
@@ -78,8 +76,11 @@ def make_search_half_pair(features):
 
 @stage
 def renewal(half_pair, impulse):
-    """Fraction of the skin with less of which a list is renewed when a collision step starts."""
-    return RENEWAL * SHIFT if impulse and half_pair.reverse >= 0 else RENEWAL
+    """Fraction of the skin with less of which a list is renewed when a collision step starts.
+
+    None of two faces': four points last only for a small shift, see `search_half_pair`.
+    """
+    return 0.0 if impulse and half_pair.reverse >= 0 else RENEWAL
 
 
 @stage

@@ -3,7 +3,7 @@
 Sequential impulses need more sweeps, and make towers sway, the more points share a load. So of all
 candidates of a pair that would touch on the same face, from both half-pairs, only four stay: those
 that span the largest patch. They carry the weight of all. They are chosen when lists are replaced,
-which is early: after a shift of a tenth of the skin one of them may be off the other face.
+which is early: after a shift of half the rounding one of them may be off the other face.
 A mesh keeps all its candidates: its round sides have many samples nearly in a plane, and on four
 that span it, but are not the deepest, it would rock without end.
 """

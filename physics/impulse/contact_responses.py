@@ -17,6 +17,8 @@ from physics.impulse.sweep import ANCHOR_RATE, soft_response, target_approach
 from physics.model.features import cached_by_features
 from physics.scene.shapes import PLANE
 
+# relative accuracy of the impulses
+ACCURACY = 1e-4
 # response of a contact that sticks, as a multiple of its effective mass: nearly rigid
 STICKING = 1e5
 

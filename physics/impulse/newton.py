@@ -21,11 +21,10 @@ import math
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.impulse.blocks import factor, solve
 from physics.impulse.contact_matrix import add_half_pair, set_masses, sum_contacts
-from physics.impulse.contact_responses import make_set_responses
+from physics.impulse.contact_responses import ACCURACY, make_set_responses
 from physics.impulse.newton_step import (
-    CORRECTIONS,
     begin_search,
-    correct_part,
+    bisect_parts,
     make_add_slopes,
     make_apply_part,
     set_changes,
@@ -36,14 +35,6 @@ from physics.model.features import cached_by_features
 
 # per substep, at most
 ITERATIONS = 16
-# of all impulses, squared: a world that lacks less is solved
-TOLERANCE = 1e-8
-# of all impulses, squared: where a sweep would change more, it is made
-ACCEPTED = 1e-4
-# of rest_speed: overlapping solids that separate more slowly keep their velocity
-SEPARATES = 1e-3
-# of the limit of friction, beyond which a contact slides: impulses are known to that accuracy
-SLIDES = 0.9999
 
 
 @stage
@@ -56,7 +47,7 @@ def mark_separating(pair, constants, separates):
         for i in range(LANES):
             ux, uy, uz = relative_velocity(owner, surface, point, i)
             un = ux * point.normal[0, i] + uy * point.normal[1, i] + uz * point.normal[2, i]
-            found = (point.normal_impulse[i] > 0.0) & (un > SEPARATES * at(floors, i))
+            found = (point.normal_impulse[i] > 0.0) & (un > ACCURACY * at(floors, i))
             separates[i] = 1 if found else separates[i]
 
 
@@ -122,7 +113,7 @@ def make_settle(features):
                     tx, ty, tz = tangential[0, i], tangential[1, i], tangential[2, i]
                     limit = at(frictions, i) * new
                     size = math.sqrt(tx * tx + ty * ty + tz * tz)
-                    held = anchor_kept(h, size > SLIDES * limit) if solved else 1.0
+                    held = anchor_kept(h, size > (1.0 - ACCURACY) * limit) if solved else 1.0
                     cut = limit / size if size > limit else 1.0
                     sx = cut * tx if solved else kept[0, i]
                     sy = cut * ty if solved else kept[1, i]
@@ -162,7 +153,7 @@ def make_newton(features):
                 first = workspace.half_pair[k].first_row
                 set_responses(pair, model.half_pair[k], rows, first, h, search)
         for i in range(LANES):
-            lacks = search.lacking[i] > TOLERANCE * search.scale[i]
+            lacks = search.lacking[i] > ACCURACY**2 * search.scale[i]
             search.unsolved[i] = 1 if lacks & (search.deep[i] == 0) else 0
             count += search.unsolved[i]
         return count
@@ -209,9 +200,9 @@ def make_newton(features):
     def find_part(model, workspace):
         search = workspace.search[0]
         begin_search(search)
-        for _ in range(CORRECTIONS):
+        for _ in range(ITERATIONS):
             find_slopes(model, workspace)
-            if correct_part(search) == 0:
+            if bisect_parts(search) == 0:
                 return
 
     @sequence
@@ -234,7 +225,8 @@ def make_newton(features):
                     pair, rows = operands_of(model, workspace, k), workspace.response_row
                     apply_part(pair, rows, workspace.half_pair[k].first_row, search.part)
         for i in range(LANES):
-            fails = (search.deep[i] != 0) | (search.off[i] > ACCEPTED * search.scale[i])
+            # what a sweep would change is squared, as all impulses are: more than one percent
+            fails = (search.deep[i] != 0) | (search.off[i] > ACCURACY * search.scale[i])
             search.unsolved[i] = 1 if fails else 0
             search.moves[i] = search.unsolved[i]
             left += search.unsolved[i]

@@ -6,7 +6,7 @@ Along the solution dv the energy that Newton's method makes less has the slope
 
 over the contacts, with the impulse p now, its change dp by the solution and the impulse p(u) of
 `contact_responses.py`. Where contacts open, close or begin to slide on the way, the whole solution
-can be too much; the part at which the slope vanishes is bracketed and interpolated.
+can be too much; the part at which the slope vanishes is then found by bisection.
 """
 
 from physics.compiler.jit import LANES, stage
@@ -14,13 +14,6 @@ from physics.impulse.contact_responses import contact_impulse, response_times
 from physics.impulse.point_impulses import apply_impulse
 from physics.model.features import cached_by_features
 from physics.motion.vectors import cross
-
-# how often the part is corrected
-CORRECTIONS = 6
-# slope that counts as none, relative to that at the start
-FLAT = 0.1
-# a correction stays away from the ends of the bracket by this fraction of it
-MARGIN = 0.1
 
 
 @stage
@@ -88,28 +81,23 @@ def make_add_slopes(features):
 def begin_search(search):
     """Tries the whole solution, in worlds that aren't solved yet."""
     for i in range(LANES):
-        search.low[i] = 0.0
-        search.high[i] = 1.0
-        search.low_slope[i] = search.slope[i]
+        search.least[i] = 0.0
+        search.most[i] = 1.0
         search.steepest[i] = -search.slope[i]
         search.part[i] = 1.0 if search.unsolved[i] != 0 else 0.0
 
 
 @stage
-def correct_part(search):
-    """Corrects the parts where the slope isn't flat; how many those are."""
+def bisect_parts(search):
+    """Corrects the parts whose slope is more than half of that at the start; how many those are."""
     count = 0
     for i in range(LANES):
-        part, slope, flat = search.part[i], search.slope[i], FLAT * search.steepest[i]
+        part, slope, flat = search.part[i], search.slope[i], 0.5 * search.steepest[i]
         uphill, downhill = slope > flat, (slope < -flat) & (part < 1.0)
         if (search.unsolved[i] != 0) & (uphill | downhill):
-            search.high[i] = part if uphill else search.high[i]
-            search.high_slope[i] = slope if uphill else search.high_slope[i]
-            search.low[i] = search.low[i] if uphill else part
-            search.low_slope[i] = search.low_slope[i] if uphill else slope
-            low, size = search.low[i], search.high[i] - search.low[i]
-            share = search.low_slope[i] / (search.low_slope[i] - search.high_slope[i])
-            search.part[i] = low + size * min(max(share, MARGIN), 1.0 - MARGIN)
+            search.most[i] = part if uphill else search.most[i]
+            search.least[i] = search.least[i] if uphill else part
+            search.part[i] = 0.5 * (search.least[i] + search.most[i])
             count += 1
     return count
 

@@ -154,10 +154,8 @@ SEARCH = np.dtype(
         ("part", "f8", (LANES,)),  # of the solution that is taken, see impulse/newton_step.py
         ("slope", "f8", (LANES,)),  # J, of the energy there
         ("steepest", "f8", (LANES,)),  # J, minus that at the start
-        ("low", "f8", (LANES,)),  # the part is between these two
-        ("high", "f8", (LANES,)),
-        ("low_slope", "f8", (LANES,)),  # J
-        ("high_slope", "f8", (LANES,)),
+        ("least", "f8", (LANES,)),  # the part is between these two
+        ("most", "f8", (LANES,)),
     ],
     align=True,
 )

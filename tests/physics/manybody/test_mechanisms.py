@@ -85,7 +85,7 @@ def move(simulation, scene):
     simulation.changed(poses=False)
 
 
-@pytest.mark.parametrize(("law", "close"), [("balanced", 1e-9), ("solid", 1e-3)])
+@pytest.mark.parametrize(("law", "close"), [("balanced", 1e-6), ("solid", 3e-3)])
 def test_mechanisms_move_as_among_all_pairs_and_bitwise_the_same_for_any_threads(
     monkeypatch, law, close
 ):
@@ -105,7 +105,7 @@ def test_mechanisms_move_as_among_all_pairs_and_bitwise_the_same_for_any_threads
             simulation.advance(STEP, simulation.everyone)
         states = [simulation.state.dynamic for simulation in simulations]
         assert states[0].tobytes() == states[1].tobytes() == states[2].tobytes()
-        # impulses are swept in another order, so they converge in another way
+        # sums in another order: round-off grows, and impulses converge in another way
         for name in ("position", "reference"):
             assert np.abs(states[0][name] - states[3][name]).max() < close
     one = worlds[0]

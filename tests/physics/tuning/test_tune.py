@@ -165,5 +165,5 @@ def test_scenes_in_which_nothing_touches_get_integrators():
     assert not can_touch(filtered)
     assert can_touch(SLIDE)
     steps = [f.substep for family in families(SLIDE) for f in family.members]
-    assert len(steps) == 10 * 19
+    assert len(steps) == 11 * 19
     assert all(abs(0.04 / h - round(0.04 / h)) < 1e-9 for h in steps)
