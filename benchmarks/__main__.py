@@ -14,6 +14,7 @@ from time import perf_counter
 from benchmarks.measure import (
     accuracy,
     features,
+    flags,
     memory,
     presets,
     rendering,
@@ -36,6 +37,7 @@ MODULES = {
     "rendering": rendering,
     "accuracy": accuracy,
     "features": features,
+    "flags": flags,
     "time_control": time_control,
 }
 

@@ -26,7 +26,7 @@ CUBE, SLAB = Box((0.02, 0.02, 0.02)), Box((0.02, 0.02, 0.015))
 TOUCHING = 0.02 + 0.015  # m, distance at which a finger of 15 mm radius touches the cube's face
 
 
-def _cube(
+def cube(
     material: Material = ROUGH, shape: Box = CUBE, finger: Vector | None = None, cubes: int = 1
 ) -> Scene:
     """A tower of blocks on the ground, and a finger that stays at a position."""
@@ -39,12 +39,13 @@ def _cube(
     return Scene(bodies, [Ground(material)], drives)
 
 
-def _flying(shape: Box | Sphere, spin: float) -> Scene:
+def flying(shape: Box | Sphere, spin: float) -> Scene:
     """One body that spins, without gravity."""
     return Scene([Body(shape, mass=0.1, angular_velocity=(spin, 2 * spin, 0))], gravity=(0, 0, 0))
 
 
-def _ball(material: Material) -> Scene:
+def ball(material: Material) -> Scene:
+    """A ball on the ground."""
     body = Body(Sphere(0.02), mass=0.1, position=(0, 0, 0.02), material=material)
     return Scene([body], [Ground(material)])
 
@@ -55,54 +56,55 @@ def _two_cubes_apart() -> Scene:
 
 
 def _wall() -> Scene:
-    scene = _cube()
+    scene = cube()
     wall = Static(Box((0.02, 0.2, 0.02)), position=(0.041, 0, 0.02), material=ROUGH)
     return Scene(scene.bodies, [*scene.statics, wall])
 
 
-def _slope() -> Scene:
-    return replace(_cube(), gravity=tilted_gravity(0.2))
+def slope() -> Scene:
+    """A cube under inclined gravity."""
+    return replace(cube(), gravity=tilted_gravity(0.2))
 
 
-def _meshed(cubes: int) -> Scene:
+def meshed(cubes: int) -> Scene:
     """A tower of cubes as meshes."""
     vertices, faces = meshes.cuboid(CUBE.half_extents)
-    scene, mesh = _cube(cubes=cubes), Mesh(vertices=vertices, faces=faces)
+    scene, mesh = cube(cubes=cubes), Mesh(vertices=vertices, faces=faces)
     return replace(scene, bodies=[replace(body, shape=mesh) for body in scene.bodies])
 
 
 # name: the scene that it extends, scene, fidelity
 CASES: dict[str, tuple[str, Scene, Fidelity]] = {
-    "ball flies": ("", _flying(Sphere(0.02), 0.0), Fidelity()),
-    "cube flies and spins": ("ball flies", _flying(CUBE, 1.0), Fidelity()),
+    "ball flies": ("", flying(Sphere(0.02), 0.0), Fidelity()),
+    "cube flies and spins": ("ball flies", flying(CUBE, 1.0), Fidelity()),
     "slab flies and spins": (
         "cube flies and spins",
-        _flying(SLAB, 1.0),
+        flying(SLAB, 1.0),
         Fidelity(),
     ),
-    "ball rests, no friction": ("ball flies", _ball(SMOOTH), Fidelity()),
-    "ball rests": ("ball rests, no friction", _ball(ROUGH), Fidelity()),
-    "cube rests, no friction": ("cube flies and spins", _cube(SMOOTH), Fidelity()),
-    "cube rests": ("cube rests, no friction", _cube(), Fidelity()),
-    "cube rests on a slope": ("cube rests", _slope(), Fidelity()),
-    "slab rests": ("cube rests", _cube(shape=SLAB), Fidelity()),
-    "cube rests, linear dashpot": ("cube rests", _cube(), Fidelity(damping="dashpot")),
-    "cube and distant finger": ("cube rests", _cube(finger=(0.2, 0, 0.1)), Fidelity()),
+    "ball rests, no friction": ("ball flies", ball(SMOOTH), Fidelity()),
+    "ball rests": ("ball rests, no friction", ball(ROUGH), Fidelity()),
+    "cube rests, no friction": ("cube flies and spins", cube(SMOOTH), Fidelity()),
+    "cube rests": ("cube rests, no friction", cube(), Fidelity()),
+    "cube rests on a slope": ("cube rests", slope(), Fidelity()),
+    "slab rests": ("cube rests", cube(shape=SLAB), Fidelity()),
+    "cube rests, linear dashpot": ("cube rests", cube(), Fidelity(damping="dashpot")),
+    "cube and distant finger": ("cube rests", cube(finger=(0.2, 0, 0.1)), Fidelity()),
     "cube and touching finger": (
         "cube and distant finger",
-        _cube(finger=(-TOUCHING + 1e-4, 0, 0.02)),
+        cube(finger=(-TOUCHING + 1e-4, 0, 0.02)),
         Fidelity(),
     ),
     "cube 1 mm from a wall": ("cube rests", _wall(), Fidelity()),
     "two cubes apart": ("cube rests", _two_cubes_apart(), Fidelity()),
-    "two cubes stacked": ("two cubes apart", _cube(cubes=2), Fidelity()),
+    "two cubes stacked": ("two cubes apart", cube(cubes=2), Fidelity()),
     "two cubes stacked, particles": (
         "two cubes stacked",
-        _cube(cubes=2),
+        cube(cubes=2),
         Fidelity(geometry="particle"),
     ),
-    "meshed cube rests": ("cube rests", _meshed(1), Fidelity()),
-    "two meshed cubes stacked": ("two cubes stacked", _meshed(2), Fidelity()),
+    "meshed cube rests": ("cube rests", meshed(1), Fidelity()),
+    "two meshed cubes stacked": ("two cubes stacked", meshed(2), Fidelity()),
 }
 
 
