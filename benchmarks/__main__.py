@@ -13,6 +13,7 @@ from time import perf_counter
 
 from benchmarks.measure import (
     accuracy,
+    consistency,
     features,
     flags,
     memory,
@@ -36,6 +37,7 @@ MODULES = {
     "memory": memory,
     "rendering": rendering,
     "accuracy": accuracy,
+    "consistency": consistency,
     "features": features,
     "flags": flags,
     "time_control": time_control,
