@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from benchmarks.measure.features import ROUNDS, SECONDS, WORLDS, _advance
+from benchmarks.measure.features import ROUNDS, SECONDS, WORLDS, frame_side
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.tables import Cell, Table, plain
 from benchmarks.report.timing import take_turns
@@ -78,7 +78,7 @@ def table(title: str, scenes: dict[str, Scene], law: str) -> Table:
     for name, scene in scenes.items():
         world = World(scene, law, count=WORLDS, threads=1)
         world.advance(0.24)
-        sides[name] = _advance(world)
+        sides[name] = frame_side(world)
     cost = {name: 1e9 / max(found) for name, found in take_turns(sides, ROUNDS, SECONDS).items()}
     first = next(iter(cost.values()))
     rows: list[list[Cell]] = [[name, value, value / first] for name, value in cost.items()]

@@ -141,7 +141,7 @@ def measure() -> Iterator[Table]:
             begin = perf_counter()
             found = 1e3 * errors(pieces, fidelity, known[fidelity.law])
             rate = WORLDS * PIECES * FRAME / (perf_counter() - begin)
-            shares = [float(np.quantile(found, q)) for q in (0.5, 0.9, 0.99)]
-            rows.append([motion, setting, rate, *shares])
+            quantiles = [float(np.quantile(found, q)) for q in (0.5, 0.9, 0.99)]
+            rows.append([motion, setting, rate, *quantiles])
     columns = ["motion", "setting", "simulated s/s", "median mm", "9 of 10 mm", "99 of 100 mm"]
     yield Table("consistency", f"Pieces of 40 ms, {WORLDS} worlds", columns, rows)

@@ -108,7 +108,7 @@ CASES: dict[str, tuple[str, Scene, Fidelity]] = {
 }
 
 
-def _advance(world: World) -> Side:
+def frame_side(world: World) -> Side:
     """Each call advances all worlds by a frame; counts the substeps of all worlds."""
     substeps = WORLDS * round(FRAME / world.fidelity.substep)
 
@@ -125,7 +125,7 @@ def measure() -> Iterator[Table]:
     for name, (_, scene, fidelity) in CASES.items():
         world = World(scene, fidelity, count=WORLDS, threads=1)
         world.advance(0.25)
-        sides[name], touching[name] = _advance(world), len(world.contacts().penetration)
+        sides[name], touching[name] = frame_side(world), len(world.contacts().penetration)
     cost = {name: 1e9 / max(found) for name, found in take_turns(sides, ROUNDS, SECONDS).items()}
     rows: list[list[Cell]] = []
     for name, (base, _, _) in CASES.items():

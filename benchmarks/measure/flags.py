@@ -13,7 +13,6 @@ from unittest import mock
 
 from benchmarks.measure.features import (
     CUBE,
-    FRAME,
     ROUGH,
     ROUNDS,
     SECONDS,
@@ -24,11 +23,12 @@ from benchmarks.measure.features import (
     ball,
     cube,
     flying,
+    frame_side,
     meshed,
     slope,
 )
 from benchmarks.report.tables import Cell, Table
-from benchmarks.report.timing import Side, take_turns
+from benchmarks.report.timing import take_turns
 from physics import (
     PRESETS,
     Body,
@@ -135,7 +135,7 @@ class Row(NamedTuple):
 
     Attributes:
         name: of a field of `Features`.
-        needs: the scene that needs it.
+        needs: the scene that needs it; "" if no scene does.
         other: the one that doesn't; "" if the feature follows from an argument of `World`.
         on: its value where it is needed.
         off: its value where it isn't.
@@ -212,17 +212,6 @@ def world_of(name: str, **forced: Any) -> World:
     return world
 
 
-def _side(world: World) -> Side:
-    """Each call advances all worlds by a frame; counts the substeps of all worlds."""
-    substeps = WORLDS * round(FRAME / world.fidelity.substep)
-
-    def frame() -> int:
-        world.advance(FRAME)
-        return substeps
-
-    return frame
-
-
 def measure() -> Iterator[Table]:
     """One table."""
     rows: list[list[Cell]] = []
@@ -238,7 +227,9 @@ def measure() -> Iterator[Table]:
         if row.other:
             sides["other, off"] = world_of(row.other)
             sides["other, on"] = world_of(row.other, **{row.name: row.on})
-        turns = take_turns({name: _side(world) for name, world in sides.items()}, ROUNDS, SECONDS)
+        turns = take_turns(
+            {name: frame_side(world) for name, world in sides.items()}, ROUNDS, SECONDS
+        )
         cost: dict[str, Cell] = {name: 1e9 / max(found) for name, found in turns.items()}
         figures = [cost.get(f"{scene}, {value}") for scene in ("needs", "other")
                    for value in ("off", "on")]  # fmt: skip
