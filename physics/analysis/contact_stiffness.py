@@ -14,20 +14,23 @@ Array = np.ndarray
 
 def unit_stiffness(
     model: Model, features: Features, state: State, world: int
-) -> dict[int, tuple[Array, Array, Array]]:
+) -> dict[int, tuple[Array, Array, Array, float]]:
     """Unit stiffness of a world's present contacts, by half-pair.
 
     Returns:
         For each half-pair in contact three matrices [6 m, 6 m]: along the normals, across them, and
         against relative rotation. Coordinates are the displacement and the rotation vector of each
-        dynamic body, in the world frame.
+        dynamic body, in the world frame. And what `mass_parts` gives.
     """
     touching = report(model, features, state, world)
     model = model.of_world(world)
     dynamic_count = len(model.dynamic)
-    found: dict[int, tuple[Array, Array, Array]] = {}
-    for k, point, normal, weight in zip(
-        touching.half_pair, touching.point, touching.normal, touching.weight, strict=True
+    found: dict[int, tuple[Array, Array, Array, float]] = {}
+    rows = model.half_pair[touching.half_pair]
+    ends = np.stack([rows["owner"], rows["surface"]], axis=-1)
+    parts = mass_parts(ends, touching.normal, touching.weight, model.dynamic["inverse_mass"])
+    for k, point, normal, weight, part in zip(
+        touching.half_pair, touching.point, touching.normal, touching.weight, parts, strict=True
     ):
         constants = model.half_pair[k]
         jacobian, rotation = np.zeros((2, 3, 6 * dynamic_count))
@@ -39,10 +42,44 @@ def unit_stiffness(
                 rotation[:, 6 * solid + 3 : 6 * solid + 6] = sign * np.eye(3)
         along = jacobian.T @ np.outer(normal, normal) @ jacobian
         across = jacobian.T @ jacobian - along
-        along_k, across_k, turn_k = found.get(int(k), (0.0, 0.0, 0.0))
-        turn = weight * rotation.T @ rotation
-        found[int(k)] = (along_k + weight * along, across_k + weight * across, turn_k + turn)
+        along_k, across_k, turn_k, _ = found.get(int(k), (0.0, 0.0, 0.0, 1.0))
+        turn = turn_k + weight * rotation.T @ rotation
+        found[int(k)] = (along_k + weight * along, across_k + weight * across, turn, float(part))
     return found
+
+
+def mass_parts(ends: Array, normal: Array, weight: Array, inverse_mass: Array) -> Array:
+    """Into how many parts `spring.mass_splitting` splits the mass of each contact.
+
+    Args:
+        ends: [n, 2] owner and surface of each contact; beyond the bodies they don't move.
+        normal: [n, 3].
+        weight: [n].
+        inverse_mass: [bodies] 1/kg.
+
+    Returns:
+        [n] mean of n of its two bodies, with their inverse masses as weights.
+    """
+    if not len(ends):
+        return np.ones(0)
+    pairs, pair = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    pair = pair.reshape(-1)
+    sign = np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0)
+    sums = np.zeros((len(pairs), 3))
+    np.add.at(sums, pair, (sign * weight)[:, None] * normal)
+    size = np.linalg.norm(sums, axis=1, keepdims=True)
+    direction = sums / np.where(size > 0.0, size, 1.0)
+    # a last row for all that doesn't move
+    bodies = len(inverse_mass)
+    inverse_mass, index = np.append(inverse_mass, 0.0), np.minimum(pairs, bodies)
+    tensors = np.zeros((bodies + 1, 3, 3))
+    outer = direction[:, :, None] * direction[:, None, :]
+    for end in index.T:
+        np.add.at(tensors, end, outer)
+    along = np.einsum("ni,neij,nj->ne", direction, tensors[index], direction)
+    inverse = inverse_mass[index]
+    split = np.sum(np.maximum(along, 1.0) * inverse, axis=1) / np.sum(inverse, axis=1)
+    return split[pair]
 
 
 def inverse_masses(model: Model, state: State, world: int) -> Array:

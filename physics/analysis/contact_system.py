@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from physics.analysis import stability
+from physics.analysis.contact_stiffness import mass_parts
 from physics.rotation import rotation_matrix
 
 Array = np.ndarray
@@ -62,6 +63,9 @@ class ContactSystem:
         inertia = np.where(np.isfinite(constants["inertia"]), constants["inertia"], 0.0)
         self._inertia = np.einsum("bij,bj,bkj->bik", turn, inertia, turn)  # a drive never rotates
         self._constants = constants
+        self._parts = np.ones(len(kind))
+        if not dashpot:
+            self._parts = mass_parts(ends, normal, weight, constants["inverse_mass"])
 
     def largest_stable_step(self) -> float:
         """In s, with the servos of drives; inf if nothing touches and there are none."""
@@ -94,10 +98,13 @@ class ContactSystem:
     def _loads(self, h: float) -> tuple[Array, Array, Array]:
         """Of each contact, along the normal and across it in kg, and against rotation in kg m^2."""
         dashpot, viscous = self._laws
-        along = np.array([stability.normal_load(row, dashpot, h) for row in self._rows])
+        along = np.zeros(len(self._kind))
+        for n, row in enumerate(self._rows):
+            own = self._kind == n
+            along[own] = stability.normal_load(row, dashpot, h, self._parts[own])
         across = np.array([stability.shear_load(row, viscous, h) for row in self._rows])
         twist = np.array([stability.twist_load(row, h) for row in self._rows])
-        return along[self._kind], across[self._kind], twist[self._kind]
+        return along, across[self._kind], twist[self._kind]
 
     def _accelerate(self, loads: tuple[Array, Array, Array], servo: Array, x: Array) -> Array:
         """M^-1 A x, see `analysis.stability`."""

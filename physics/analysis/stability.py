@@ -12,7 +12,7 @@ The normal law relaxes within the step and estimates the load from the last one 
 upper limit; one that separates has L = f_before + m (u - u_before) / h. With u flipping, A is
 phi h c + h^2 k / 2 for the first, and phi (h c + h^2 k / 2) + (1 - phi) (2 m - A of the first) for
 the second. In a rocking mode half of the contacts are of either kind; in other modes all contacts
-alternate. So A is the mean of the two.
+alternate. So A is the mean of the two. In L, m is divided by the n of `spring.mass_splitting`.
 """
 
 import math
@@ -42,8 +42,11 @@ _PARTNERS = 6
 _TURN = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
 
-def normal_load(half_pair: Any, dashpot: bool, h: float) -> float:
-    """A in kg of a half-pair's whole normal stiffness, for a contact that lasts."""
+def normal_load(half_pair: Any, dashpot: bool, h: float, parts: Any = 1.0) -> Any:
+    """A in kg of a half-pair's whole normal stiffness, for contacts that last.
+
+    parts: n of each contact, see `contact_stiffness.mass_parts`. A falls with it.
+    """
     k, m = float(half_pair["stiffness"]), float(half_pair["pair_mass"])
     damping = float(half_pair["damping"])
     critical = math.sqrt(k * m)
@@ -56,7 +59,7 @@ def normal_load(half_pair: Any, dashpot: bool, h: float) -> float:
     x = h * c / m
     phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
     approaching = phi * h * c + 0.5 * h * h * k
-    parting = phi * (h * c + 0.5 * h * h * k) + (1.0 - phi) * (2.0 * m - approaching)
+    parting = phi * (h * c + 0.5 * h * h * k) + (1.0 - phi) * (2.0 * m / parts - approaching)
     return 0.5 * (approaching + parting)
 
 
@@ -99,9 +102,9 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
 
     def load(h: float) -> float:
         A = np.zeros_like(inverse)
-        for k, (along, across, turn) in contacts.items():
+        for k, (along, across, turn, parts) in contacts.items():
             half_pair = model.half_pair[k]
-            A += normal_load(half_pair, features.dashpot, h) * along
+            A += normal_load(half_pair, features.dashpot, h, parts) * along
             A += (
                 shear_load(half_pair, features.viscous, h) * across
                 + twist_load(half_pair, h) * turn

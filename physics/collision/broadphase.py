@@ -154,6 +154,8 @@ def make_forget(features):
                     live.previous_weight[i] = 0.0
                     live.previous_impact[i] = 0.0
                     live.previous_closing[i] = 0.0
+                    for c in range(3):
+                        live.previous_normal[c, i] = 0.0
                     live.previous_normal_force[i] = 0.0
         for i in range(LANES):
             lane.updates_memory[i] = 1 if lane.needs_refresh[i] == STARTS_ANEW else 0

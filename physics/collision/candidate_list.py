@@ -240,6 +240,8 @@ def make_search(features):
             live.previous_weight[i] = 0.0
             live.previous_impact[i] = 0.0
             live.previous_closing[i] = 0.0
+            for c in range(3):
+                live.previous_normal[c, i] = 0.0
             live.previous_normal_force[i] = 0.0
 
     return search

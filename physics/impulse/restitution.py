@@ -13,6 +13,10 @@ consistent with several contacts:
    friction makes it more, restitution is scaled down to that, with the largest e among the world's
    colliding contacts: no collision gains energy;
 3. friction again with the new normal impulses, and no approach at contacts that only took part.
+   Where a normal impulse shrinks, friction gives back a part of what it took, so a light body that
+   is jammed between a hand and the ground could gain energy. Then all impulses p of the world are
+   scaled down to where the collision gains none: scaled by s they do the work
+   s p u + s^2 (p (u' - u))/2, with the relative velocities u before and u' after.
 
 The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the factor is the impulse.
 """
@@ -179,6 +183,46 @@ def apply_restitution(pair, lane, rescale):
             apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
 
 
+@stage
+def add_final_power(pair, lane):
+    """Adds the products of impulses and the relative velocities after them to `impact_power`."""
+    points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
+    for n in range(points.shape[0]):
+        point = points[n]
+        normal, tangential = point.normal, point.tangential_impact
+        for i in range(LANES):
+            size = point.normal_impact[i]
+            ux, uy, uz = relative_velocity(owner, surface, point, i)
+            lane.impact_power[i] += (
+                (size * normal[0, i] + tangential[0, i]) * ux
+                + (size * normal[1, i] + tangential[1, i]) * uy
+                + (size * normal[2, i] + tangential[2, i]) * uz
+            )
+
+
+@stage
+def scale_impacts(pair, lane):
+    """Takes back all but a fraction of all impulses."""
+    points = pair.points
+    for n in range(points.shape[0]):
+        point = points[n]
+        normal, tangential = point.normal, point.tangential_impact
+        for i in range(LANES):
+            scale, size = lane.restitution_scale[i], point.normal_impact[i]
+            px, py, pz = tangential[0, i], tangential[1, i], tangential[2, i]
+            point.normal_impact[i] = scale * size
+            tangential[0, i] = scale * px
+            tangential[1, i] = scale * py
+            tangential[2, i] = scale * pz
+            less = scale - 1.0
+            apply_impulse(
+                pair, point, i,
+                less * (size * normal[0, i] + px),
+                less * (size * normal[1, i] + py),
+                less * (size * normal[2, i] + pz),
+            )  # fmt: skip
+
+
 @cached_by_features
 def make_apply_impacts(features):
     """Stage that changes momenta by the impact impulses.
@@ -285,9 +329,33 @@ def make_impacts(features):
         hold(model, workspace, workspace.lane[0].colliding, 0.0, workspace.lane[0])
 
     @stage
+    def remove_gain(model, workspace):
+        """Scales the impulses of the worlds in which collisions have gained energy."""
+        lane = workspace.lane[0]
+        work, power, scale, gains = lane.impact_work, lane.impact_power, lane.restitution_scale, 0
+        for i in range(LANES):
+            power[i] = 0.0
+            gains += 1 if work[i] > 0.0 else 0
+        if gains == 0:
+            return
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                add_final_power(operands_of(model, workspace, k), lane)
+        for i in range(LANES):
+            kinetic = power[i] - work[i]  # p (u' - u) / 2, the work at s = 1 less p u
+            lane.unconverged[i] = 1 if work[i] > 0.0 else 0
+            scale[i] = max(1.0 - work[i] / kinetic, 0.0) if work[i] > 0.0 < kinetic else 1.0
+        for k in range(model.half_pair.shape[0]):
+            if workspace.half_pair[k].slots > 0:
+                scale_impacts(operands_of(model, workspace, k), lane)
+        couple_finger_velocities(model, workspace)
+        hold(model, workspace, lane.unconverged, 0.0, lane)
+
+    @stage
     def collide(model, workspace, h, refresh):
         lane = workspace.lane[0]
         work, allowed_work, scale = lane.impact_work, lane.allowed_work, lane.restitution_scale
+        lost = lane.compression_work
         clear_hold(model, workspace)
         begin_hold(model, workspace, True, 0.0)
         for i in range(LANES):
@@ -296,6 +364,7 @@ def make_impacts(features):
         for i in range(LANES):
             e = lane.impact_restitution[i]
             allowed_work[i] = e * e * max(-work[i], 0.0)
+            lost[i] = work[i]
             work[i] = 0.0
         restitute(model, workspace, False)
         for i in range(LANES):
@@ -303,6 +372,9 @@ def make_impacts(features):
             scale[i] = math.sqrt(allowed / gained) if gained > allowed else 1.0
         restitute(model, workspace, True)
         solve_impacts(model, workspace, True)
+        for i in range(LANES):
+            work[i] += lost[i]
+        remove_gain(model, workspace)
         apply_impacts(model, workspace, refresh)
         end_hold(model, workspace, h if refresh else 0.0)
 

@@ -49,6 +49,7 @@ def make_warm_start(features):
 
     `contact_rows` sets `extra_impulse` to the impulses of the last substep with reversed sign.
     Adding the relaxed ones leaves the change that relaxing made; this step's force includes it.
+    The friction that a contact kept when it ended is no guess for this step.
     """
     friction, resistance = features.friction, features.resistance
 
@@ -70,13 +71,21 @@ def make_warm_start(features):
                 extra[0, i] += px
                 extra[1, i] += py
                 extra[2, i] += pz
-                apply_impulse(pair, point, i, px, py, pz)
+                guess = 1.0 if size > 0.0 else 0.0
+                if friction:
+                    tangential[0, i] *= guess
+                    tangential[1, i] *= guess
+                    tangential[2, i] *= guess
+                apply_impulse(pair, point, i, guess * px, guess * py, guess * pz)
                 if resistance:
                     tx, ty, tz = twist[0, i], twist[1, i], twist[2, i]
                     extra_angular[0, i] += tx
                     extra_angular[1, i] += ty
                     extra_angular[2, i] += tz
-                    apply_angular_impulse(pair, i, tx, ty, tz)
+                    twist[0, i] *= guess
+                    twist[1, i] *= guess
+                    twist[2, i] *= guess
+                    apply_angular_impulse(pair, i, guess * tx, guess * ty, guess * tz)
 
     return warm_start
 

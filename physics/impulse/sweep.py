@@ -13,6 +13,10 @@ impulse. An anchor remembers how far the point has crept since it came to stick,
 The effective mass across the normal is the smallest in any direction, so that a step can only
 decrease the energy even where the cone cuts it. Resistance against rolling and spinning is the same
 law for the relative angular velocity.
+
+The sweep that relaxes takes back normal impulses of the last step where the solids are apart, and
+friction with them, as far as it exceeds mu times what is left. Where nothing is left, the contact
+has ended: its friction and its resistance stay, for to take them back would drive what slides.
 """
 
 import math
@@ -51,8 +55,8 @@ def anchor_kept(h, slides):
 
 
 @stage
-def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
-    """Corrects the angular impulse of a point against rolling and spinning."""
+def resist_rotation(pair, point, i, normal_impulse, rolling, spinning, stays):
+    """Corrects the angular impulse of a point against rolling and spinning, unless it stays."""
     owner, surface, A, B = pair.owner[0], pair.surface[0], pair.A, pair.B
     nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
     # lower bound of the moment of inertia, by the largest row sum of its inverse
@@ -70,6 +74,7 @@ def resist_rotation(pair, point, i, normal_impulse, rolling, spinning):
     size = math.sqrt(qx * qx + qy * qy + qz * qz)
     cut = rolling * normal_impulse / size if size > rolling * normal_impulse else 1.0
     qx, qy, qz = cut * qx + along * nx, cut * qy + along * ny, cut * qz + along * nz
+    qx, qy, qz = px if stays else qx, py if stays else qy, pz if stays else qz
     point.twist[0, i] = qx
     point.twist[1, i] = qy
     point.twist[2, i] = qz
@@ -117,6 +122,7 @@ def make_sweep(features):
                 new = new if weight > 0.0 else 0.0
                 if newton:
                     new = new if moves[i] != 0 else before
+                ended = apart & (new == 0.0) & (not soft)
                 step = new - before
                 point.normal_impulse[i] = new
                 apply_impulse(pair, point, i, step * nx, step * ny, step * nz)
@@ -138,6 +144,10 @@ def make_sweep(features):
                     qx *= cut
                     qy *= cut
                     qz *= cut
+                    if not soft:  # the friction of a contact that has ended stays
+                        qx = px if ended else qx
+                        qy = py if ended else qy
+                        qz = pz if ended else qz
                     if newton:
                         qx = qx if moves[i] != 0 else px
                         qy = qy if moves[i] != 0 else py
@@ -154,6 +164,6 @@ def make_sweep(features):
                         anchor[2, i] *= held
                     apply_impulse(pair, point, i, qx - px, qy - py, qz - pz)
                 if resistance:
-                    resist_rotation(pair, point, i, new, rolling, spinning)
+                    resist_rotation(pair, point, i, new, rolling, spinning, ended)
 
     return sweep

@@ -19,7 +19,8 @@ from physics.model.features import cached_by_features
 from physics.model.state import State
 from physics.model.tables import Model
 from physics.model.workspace import Workspace
-from physics.spring.contacts import make_contacts
+from physics.spring.contacts import make_pair_contacts
+from physics.spring.mass_splitting import pair_normal, pair_parts, splits_mass
 
 
 @stage
@@ -201,7 +202,8 @@ def make_find_candidates(features):
 @cached_by_features
 def make_batch_forces(features):
     """Sequence that finds the contacts of a batch and writes the wrenches on its solids."""
-    find_candidates, contacts = make_find_candidates(features), make_contacts(features)
+    find_candidates, contacts = make_find_candidates(features), make_pair_contacts(features)
+    splits = splits_mass(features)
 
     @sequence
     def batch_forces(
@@ -212,13 +214,19 @@ def make_batch_forces(features):
         mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
         own = state_of(state, pairs, kind, b)
         touching = find_candidates(model, own, mine, crowd, pairs, b, starts_collision_step)
-        wrench = pairs.wrench[b]
+        wrench, last = pairs.wrench[b], kind.half_pair_count - 1
         if touching:
             one, two = workspace.solid[0], workspace.solid[1]
             mark_lanes(workspace.lane[0], pairs.first[b], remembers)
             gather_velocity(crowd.frame, pairs.first[b], one)
             gather_velocity(crowd.frame, pairs.second[b], two)
-            contacts(model, own, mine, 0, h, h, elapsed)
+            if splits:
+                gather_columns(crowd.normals, pairs.first[b], 0, 6, one.normals)
+                gather_columns(crowd.normals, pairs.second[b], 0, 6, two.normals)
+                one.partners, two.partners = 2, 2  # or more
+                pair_normal(model, mine, last)
+                pair_parts(model, mine, last)
+            contacts(model, own, mine, 0, h, elapsed)
             if remembers:
                 record_first_touch(mine, state.world[0].time + elapsed)
             for i in range(LANES):
@@ -227,6 +235,8 @@ def make_batch_forces(features):
                     wrench[i, 3 + c] = one.torque[c, i]
                     wrench[i, 6 + c] = two.force[c, i]
                     wrench[i, 9 + c] = two.torque[c, i]
+            if splits:
+                pair_normal(model, mine, last)  # for the next step
             pairs.busy[b] = 1
         elif pairs.busy[b] != 0:
             for i in range(LANES):

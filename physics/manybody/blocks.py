@@ -271,6 +271,28 @@ def add_contacts(crowd, pairs, m, force, torque):
 
 
 @stage
+def add_normals(crowd, pairs, m):
+    """Sums n n^T over the pairs of each body."""
+    for i in range(LANES):
+        body = m * LANES + i
+        sums = crowd.normals[body]
+        for c in range(6):
+            sums[c] = 0.0
+        for n in range(crowd.incident_first[body], crowd.incident_first[body + 1]):
+            b, lane = (crowd.incident[n] >> 1) // LANES, (crowd.incident[n] >> 1) % LANES
+            if pairs.busy[b] != 0:
+                half_pairs = crowd.pair_kind[pairs.kind[b]].half_pair_count
+                normal = pairs.work[pairs.first_work[b] + half_pairs - 1].normal
+                x, y, z = normal[0, lane], normal[1, lane], normal[2, lane]
+                sums[0] += x * x
+                sums[1] += y * y
+                sums[2] += z * z
+                sums[3] += x * y
+                sums[4] += x * z
+                sums[5] += y * z
+
+
+@stage
 def write_tensors(crowd, m):
     """Writes the inverse inertia of a block's bodies in the world frame."""
     R, j = crowd.solid[m].rotation, crowd.constants[m].inverse_inertia

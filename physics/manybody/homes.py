@@ -60,6 +60,8 @@ def clear_lane(row, i, remaining_skin):
     row.previous_weight[i] = 0.0
     row.previous_impact[i] = 0.0
     row.previous_closing[i] = 0.0
+    for c in range(3):
+        row.previous_normal[c, i] = 0.0
 
 
 @cache

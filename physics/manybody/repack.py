@@ -19,7 +19,7 @@ from physics.model.features import Features
 Array = np.ndarray
 
 # numbers of a half-pair, and of a candidate besides its memory, that move with a pair
-_ROW, _CANDIDATE = 8, 11
+_ROW, _CANDIDATE = 11, 11
 
 
 def room_for(pairs: int, half_pairs: int, candidates: int, features: Features) -> int:
@@ -73,6 +73,8 @@ def make_repack(features: Features):
         aside[at + 5] = row.previous_weight[i]
         aside[at + 6] = row.previous_impact[i]
         aside[at + 7] = row.previous_closing[i]
+        for c in range(3):
+            aside[at + 8 + c] = row.previous_normal[c, i]
         at += _ROW
         for n in range(row.count[i]):
             slot = candidate[n]
@@ -102,6 +104,8 @@ def make_repack(features: Features):
         row.previous_weight[i] = aside[at + 5]
         row.previous_impact[i] = aside[at + 6]
         row.previous_closing[i] = aside[at + 7]
+        for c in range(3):
+            row.previous_normal[c, i] = aside[at + 8 + c]
         at += _ROW
         for n in range(row.count[i]):
             slot = candidate[n]

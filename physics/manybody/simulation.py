@@ -140,6 +140,7 @@ class CrowdSimulation(Simulation):
             motor=np.zeros((groups * LANES, found.motor[:, 1].max(initial=-1) + 1, 2)),
             frame=frame,
             tensor=np.zeros((places, 8)),
+            normals=np.zeros((places, 6)),
             margin=np.zeros((blocks, LANES)),
             motion=np.zeros((blocks, LANES)),
             wrench=np.zeros((0, 6)),
@@ -272,9 +273,9 @@ class CrowdSimulation(Simulation):
         )  # fmt: skip
 
     def saved(self) -> Any:
-        """A copy of the pairs, and of how far bodies have moved since they were found."""
+        """A copy of the pairs, how far bodies have moved since they were found, what they touch."""
         return [
-            (one[0].motion.copy(), one[0].margin.copy(), lists.saved())
+            (one[0].motion.copy(), one[0].margin.copy(), one[0].normals.copy(), lists.saved())
             for one, lists in zip(self._worlds, self._lists, strict=True)
         ]
 
@@ -287,12 +288,13 @@ class CrowdSimulation(Simulation):
 
     def restore(self, saved: Any) -> None:
         """Returns to what `saved` gave."""
-        for one, lists, (motion, margin, pairs) in zip(
+        for one, lists, (motion, margin, normals, pairs) in zip(
             self._worlds, self._lists, saved, strict=True
         ):
             lists.restore(pairs)
             one[0] = lists.listed(one[0], margin)
             one[0].motion[...] = motion
+            one[0].normals[...] = normals
 
     def arrays(self, world: int) -> tuple[Crowd, Pairs]:
         """The arrays of a world."""

@@ -12,6 +12,7 @@ from physics.compiler.jit import large_entry
 from physics.manybody.batches import make_batch_forces
 from physics.manybody.blocks import (
     add_contacts,
+    add_normals,
     blocks_of,
     make_end_step,
     make_hold_joints,
@@ -22,6 +23,7 @@ from physics.manybody.blocks import (
 from physics.manybody.team import FAR, Team, share, takes_batch, total, wait
 from physics.model.features import EULER, Features
 from physics.model.state import STARTS_ANEW
+from physics.spring.mass_splitting import splits_mass
 
 # what a call continues with, see `make_spring_steps`
 STEP, RESUME, REFRESH = range(3)
@@ -34,6 +36,7 @@ def make_spring_steps(features: Features):
     move_group, place_group = make_move_group(features), make_place_group(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     batch_forces, end_step = make_batch_forces(features), make_end_step(features)
+    splits = splits_mass(features)
     before = 1.0 if features.integrator == EULER else 0.5
 
     @large_entry
@@ -82,6 +85,8 @@ def make_spring_steps(features: Features):
                 known_forces(model, workspace, crowd, g, step)
                 for m in blocks_of(crowd, g):
                     add_contacts(crowd, pairs, m, crowd.solid[m].force, crowd.solid[m].torque)
+                    if splits:
+                        add_normals(crowd, pairs, m)
                 hold_joints(model, state, workspace, crowd, g, h, step)
                 end_step(model, workspace, crowd, g, step, (1.0 - before) * step)
             done += 0 if phase == REFRESH else 1

@@ -130,6 +130,8 @@ def load(model, state, workspace, chosen, g):
                 half_pair.previous_weight[i] = saved.previous_weight
                 half_pair.previous_impact[i] = saved.previous_impact
                 half_pair.previous_closing[i] = saved.previous_closing
+                for c in range(3):
+                    half_pair.previous_normal[c, i] = saved.previous_normal[c]
             else:
                 half_pair.count[i] = 0
                 half_pair.remaining_skin[i] = 1e300
@@ -138,6 +140,8 @@ def load(model, state, workspace, chosen, g):
                 half_pair.previous_weight[i] = 0.0
                 half_pair.previous_impact[i] = 0.0
                 half_pair.previous_closing[i] = 0.0
+                for c in range(3):
+                    half_pair.previous_normal[c, i] = 0.0
     for m in range(model.dynamic.shape[0]):
         weight = workspace.solid[m].weight
         for c in range(3):
@@ -250,3 +254,5 @@ def store(model, state, workspace, i, time):
         saved.previous_weight = half_pair.previous_weight[i]
         saved.previous_impact = half_pair.previous_impact[i]
         saved.previous_closing = half_pair.previous_closing[i]
+        for c in range(3):
+            saved.previous_normal[c] = half_pair.previous_normal[c, i]

@@ -38,6 +38,7 @@ HALF_PAIR_STATE = np.dtype(
         ("previous_weight", "f8"),
         ("previous_impact", "f8"),
         ("previous_closing", "f8"),
+        ("previous_normal", "f8", (3,)),  # sum of their normals times weights, in the world frame
     ],
     align=True,
 )

@@ -50,6 +50,11 @@ SOLID = np.dtype(
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
         ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
+        ("normal_sum", "f8", (3, LANES)),  # of the samples in contact, times their weight
+        # of mass splitting: n n^T summed over the solids touched in the last step, as xx yy zz xy
+        # xz yz; and the number of those that can be touched
+        ("normals", "f8", (6, LANES)),
+        ("partners", "i8"),
     ],
     align=True,
 )
@@ -69,6 +74,11 @@ HALF_PAIR_WORK = np.dtype(
         ("current_impact", "f8", (LANES,)),
         ("previous_closing", "f8", (LANES,)),
         ("current_closing", "f8", (LANES,)),
+        ("previous_normal", "f8", (3, LANES)),  # sum over these samples, in the world frame
+        # of springs, of the pair: mean normal in the last step, or zero; and the parts into which
+        # its mass is split, see spring/mass_splitting.py
+        ("normal", "f8", (3, LANES)),
+        ("parts", "f8", (LANES,)),
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
         ("first_row", "i8"),  # into Workspace.contact_row; impulse law
@@ -185,6 +195,8 @@ LANE = np.dtype(
         ("largest_change", "f8", (LANES,)),  # m/s, of a sweep
         ("impact_restitution", "f8", (LANES,)),  # the largest
         ("impact_work", "f8", (LANES,)),  # J, of all impact impulses
+        ("compression_work", "f8", (LANES,)),  # J, of those of compression
+        ("impact_power", "f8", (LANES,)),  # J, impulses times the velocities after them
         ("allowed_work", "f8", (LANES,)),  # J, upper bound for restitution
         ("restitution_scale", "f8", (LANES,)),  # fraction of restitution that this bound allows
     ],

@@ -16,6 +16,7 @@ from physics.scene.shapes import BOX, CYLINDER, PLANE
 from physics.spring.coulomb import friction_force, is_set_down, twist_torque, viscous_force, winding
 from physics.spring.energy_correction import rotational_inverse_mass
 from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
+from physics.spring.mass_splitting import splits_mass
 
 # one row per slot: what `World.contacts` reports of the candidates there
 REPORT = np.dtype(
@@ -38,6 +39,7 @@ def make_contact_loop(features, kind, report):
     slope, lever = features.slope, features.lever
     normal_force = dashpot_force if features.dashpot else hunt_crossley_force
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
+    keeps_normals = not plane and splits_mass(features)
     has_faces = kind in (BOX, CYLINDER)
     touch = make_touch(features, kind)
     memory_rows = contact_memory(features)
@@ -61,7 +63,7 @@ def make_contact_loop(features, kind, report):
         impact_sum, closing_sum = relative.impact_sum, relative.closing_sum
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
-        current_weight = relative.current_weight
+        current_weight, normal_sum = relative.current_weight, relative.normal_sum
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals, axial = constants.face_normals != 0, constants.axial != 0
         overlap_share = constants.overlap_share
@@ -132,7 +134,12 @@ def make_contact_loop(features, kind, report):
                 memory[FORCE, i] = normal
                 # an empty slot stays empty, whatever the lane's state
                 memory[APPROACH, i] = approach if weight > 0.0 else 0.0
-                current_weight[i] += weight if normal > 0.0 else 0.0
+                touching = weight if normal > 0.0 else 0.0
+                current_weight[i] += touching
+                if keeps_normals:
+                    normal_sum[0, i] += touching * nx
+                    normal_sum[1, i] += touching * ny
+                    normal_sum[2, i] += touching * nz
                 if has_faces:
                     memory[FACE, i] = face if weight > 0.0 else 0.0
                 if plane:

@@ -23,6 +23,7 @@ from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
 from physics.spring.contact_loop import make_contact_loop
 from physics.spring.energy_correction import make_energy_correction
+from physics.spring.mass_splitting import split_masses, splits_mass
 
 # N; below this normal force of a pair, weight / force could overflow
 _LEAST_FORCE = 1e-200
@@ -121,28 +122,30 @@ def make_keep_memory(features):
 @cached_by_features
 def make_begin_half_pair(features):
     """Stage that prepares the sums of a half-pair, and what its loop reads of the last step."""
-    compound = features.compound
+    compound, splits = features.compound, splits_mass(features)
 
     @stage
     def begin_half_pair(model, workspace, k, h, relative):
         """Prepares what the samples read of their pair, see spring/hunt_crossley.py.
 
-        The load rate m / (W h) turns a change of velocity into a force; W / F is the inverse of the
-        mean force. Also the mean impact speed of the last step (samples that separate count as 0)
-        and the ratio of impact speed to rate, which samples that join take over.
+        The load rate m / (W h), with the pair mass m split as `mass_splitting` says, turns a change
+        of velocity into a force; W / F is the inverse of the mean force. Also the mean impact speed
+        of the last step (samples that separate count as 0) and the ratio of impact speed to rate,
+        which samples that join take over.
 
         Also corrects the damping coefficient for (omega h)^2 W, see model/normal_damping.py.
 
-        m is the pair mass and h the step. W is the sum of the weights of the samples that were in
-        contact in the last step, over all half-pairs of the pair, and F their normal force. The
-        results are zero where nothing was in contact. All of it is written to `relative`, one
-        array, because LLVM checks before every run of the loop that its arrays don't overlap.
+        h is the step. W is the sum of the weights of the samples that were in contact in the last
+        step, over all half-pairs of the pair, and F their normal force. The results are zero where
+        nothing was in contact. All of it is written to `relative`, one array, because LLVM checks
+        before every run of the loop that its arrays don't overlap.
         """
         live, half_pair = workspace.half_pair[k], model.half_pair[k]
         # without a reverse half-pair (-1) row 0 is named, and not read
         other = workspace.half_pair[max(half_pair.reverse, 0)]
         pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
         damping, errors = half_pair.damping, half_pair.damping_error
+        parts = live.parts
         if compound:
             sum_of_pair(
                 model, workspace, k,
@@ -151,7 +154,9 @@ def make_begin_half_pair(features):
             )  # fmt: skip
         for i in range(LANES):
             mass, spring = at(pair_mass, i), at(stiffness, i)
-            rate = mass / h if h > 0.0 else 0.0
+            # a report, in steps of 0 s, splits nothing: parts may not be written
+            part = mass / max(parts[i], 1.0) if splits else mass
+            rate = part / h if h > 0.0 else 0.0
             relative.inverse_mass[i] = 1.0 / mass
             relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)
             if compound:  # until the loop these four fields are scratch, cleared below
@@ -178,6 +183,9 @@ def make_begin_half_pair(features):
             relative.normal_force_sum[i] = 0.0
             relative.impact_sum[i] = 0.0
             relative.closing_sum[i] = 0.0
+        for c in range(3):
+            for i in range(LANES):
+                relative.normal_sum[c, i] = 0.0
 
     return begin_half_pair
 
@@ -225,25 +233,55 @@ def add_wrenches(owner, surface, frame, relative):
         U[2, i] -= tz + dx * fy - dy * fx
 
 
+@stage
+def keep_normals(frame, relative, normal, updates_memory):
+    """Writes the sum of normals times weights of a half-pair, in the world frame."""
+    R, own = frame.rotation, relative.normal_sum
+    for i in range(LANES):
+        x, y, z = rotated(R, i, own[0, i], own[1, i], own[2, i])
+        normal[0, i] = x if updates_memory[i] != 0 else normal[0, i]
+        normal[1, i] = y if updates_memory[i] != 0 else normal[1, i]
+        normal[2, i] = z if updates_memory[i] != 0 else normal[2, i]
+
+
 @cached_by_features
 def make_contacts(features):
-    """Sequence that adds all contact forces, and records normal forces and first touches.
+    """Sequence that adds all contact forces of small worlds, see `make_pair_contacts`.
 
-    `elapsed` is the time in s since `advance` began. It takes the arguments of the impulse law,
-    which alone needs `drifted`, the time in s that the last drift took.
+    It takes the arguments of the impulse law, which alone needs `drifted`, the time in s that the
+    last drift took.
     """
-    half_pair = make_half_pair(features, False)
+    pair_contacts, splits = make_pair_contacts(features), splits_mass(features)
 
     @sequence
     def contacts(model, state, workspace, g, h, drifted, elapsed):
+        if splits:
+            split_masses(model, workspace)
+        pair_contacts(model, state, workspace, g, h, elapsed)
+
+    return contacts
+
+
+@cached_by_features
+def make_pair_contacts(features):
+    """Sequence that adds contact forces, and records normal forces and first touches.
+
+    Before it `HALF_PAIR_WORK.parts` are written, see `mass_splitting`. `elapsed` is the time in s
+    since `advance` began.
+    """
+    half_pair = make_half_pair(features, False)
+    compound, splits = features.compound, splits_mass(features)
+
+    @sequence
+    def pair_contacts(model, state, workspace, g, h, elapsed):
         find_waiting(workspace.lane[0])
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:
                 half_pair(model, state, workspace, (), g, k, h)
                 constants = model.half_pair[k]
-                owner = workspace.solid[constants.owner]
-                relative = owner if constants.kind == PLANE else workspace.relative[0]
+                owner, plane = workspace.solid[constants.owner], constants.kind == PLANE
+                relative = owner if plane else workspace.relative[0]
                 # one array a loop, which LLVM copies as a whole
                 for i in range(LANES):
                     live.current_weight[i] = relative.current_weight[i]
@@ -253,6 +291,10 @@ def make_contacts(features):
                     live.current_impact[i] = relative.impact_sum[i]
                 for i in range(LANES):
                     live.current_closing[i] = relative.closing_sum[i]
+                if splits and not plane:
+                    frame = workspace.solid[constants.frame if compound else constants.surface]
+                    updates = workspace.lane[0].updates_memory
+                    keep_normals(frame, relative, live.previous_normal, updates)
         # after all of them, because the half-pairs of a pair read the last step of each other
         updates_memory = workspace.lane[0].updates_memory
         everyone = all_update(updates_memory)
@@ -268,4 +310,4 @@ def make_contacts(features):
                     live.previous_closing, live.current_closing, updates_memory, everyone
                 )
 
-    return contacts
+    return pair_contacts

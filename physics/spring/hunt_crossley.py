@@ -27,7 +27,8 @@ In discrete time the law needs two details.
    With L = 0 this is again a spring times 1 + a u/v, since phi depends on d alone. So e stays exact
    however strong the relaxation, and whatever part of a face's stiffness touches.
 
-   L follows from the last step: L = f + q m (u - u_before) / h, limited to 0 ... k d. Both f and L
+   L follows from the last step: L = f + q m (u - u_before) / h, limited to 0 ... k d. (Only a part
+   of m counts here where several solids touch one of the two, see `mass_splitting`.) Both f and L
    are those of a sample scaled as if it had the pair's whole stiffness; the true ones are these
    times its weight. With W the weight of the samples in contact in the last step, and F their
    normal force, q is

@@ -10,6 +10,7 @@ from physics import (
     Body,
     Box,
     Capsule,
+    Compound,
     Drive,
     Fidelity,
     Ground,
@@ -22,6 +23,8 @@ from physics import (
 )
 from physics.reference import scenes
 
+# two slabs on each other: the lower one touches the ground, the upper one what is on it
+SLABS = Compound([(Box((0.02, 0.02, 0.01)), (0, 0, z)) for z in (-0.01, 0.01)])
 LYING = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
@@ -34,6 +37,7 @@ def scene(kind, restitution):
         "cube": [(cube, 0.1, 0.02)],
         "capsule": [(Capsule(0.02, 0.03), 0.1, 0.02)],
         "slab": [(Box((0.04, 0.04, 0.01)), 0.1, 0.01)],
+        "cube on compound": [(SLABS, 0.1, 0.02), (cube, 0.1, 0.06)],
         "two cubes": [(cube, 0.1, 0.02), (cube, 0.1, 0.06)],
         "light on heavy": [(cube, 1.0, 0.02), (cube, 0.05, 0.06)],
     }[kind]
@@ -104,6 +108,7 @@ def runs_away(some, damping, start, step):
         ("capsule", "hunt_crossley", 0.5),
         ("two cubes", "hunt_crossley", 0.5),
         ("two cubes", "dashpot", 0.5),
+        ("cube on compound", "hunt_crossley", 0.5),
         ("light on heavy", "hunt_crossley", 0.5),
     ],
 )
