@@ -15,8 +15,9 @@ consistent with several contacts:
 3. friction again with the new normal impulses, and no approach at contacts that only took part.
    Where a normal impulse shrinks, friction gives back a part of what it took, so a light body that
    is jammed between a hand and the ground could gain energy. Then all impulses p of the world are
-   scaled down to where the collision gains none: scaled by s they do the work
-   s p u + s^2 (p (u' - u))/2, with the relative velocities u before and u' after.
+   scaled down to where the collision gains none. With the relative velocities u before and u'
+   after, and c = p (u' - u)/2, a scale s makes their work s p u + s^2 c. With W = p u + c at s = 1
+   it is zero at s = 1 - W/c, and c = p u' - W.
 
 The lecture's v' = v + (eps/M) n with eps the restitution is a misprint: the factor is the impulse.
 """
@@ -184,8 +185,8 @@ def apply_restitution(pair, lane, rescale):
 
 
 @stage
-def add_final_power(pair, lane):
-    """Adds the products of impulses and the relative velocities after them to `impact_power`."""
+def add_end_work(pair, lane):
+    """Adds the products of impulses and the relative velocities after them to `end_work`."""
     points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
     for n in range(points.shape[0]):
         point = points[n]
@@ -193,7 +194,7 @@ def add_final_power(pair, lane):
         for i in range(LANES):
             size = point.normal_impact[i]
             ux, uy, uz = relative_velocity(owner, surface, point, i)
-            lane.impact_power[i] += (
+            lane.end_work[i] += (
                 (size * normal[0, i] + tangential[0, i]) * ux
                 + (size * normal[1, i] + tangential[1, i]) * uy
                 + (size * normal[2, i] + tangential[2, i]) * uz
@@ -332,19 +333,20 @@ def make_impacts(features):
     def remove_gain(model, workspace):
         """Scales the impulses of the worlds in which collisions have gained energy."""
         lane = workspace.lane[0]
-        work, power, scale, gains = lane.impact_work, lane.impact_power, lane.restitution_scale, 0
+        work, end_work, scale, gains = lane.impact_work, lane.end_work, lane.restitution_scale, 0
         for i in range(LANES):
-            power[i] = 0.0
-            gains += 1 if work[i] > 0.0 else 0
+            end_work[i] = 0.0
+            lane.unconverged[i] = 1 if work[i] > 0.0 else 0
+            gains += lane.unconverged[i]
         if gains == 0:
             return
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
-                add_final_power(operands_of(model, workspace, k), lane)
+                add_end_work(operands_of(model, workspace, k), lane)
         for i in range(LANES):
-            kinetic = power[i] - work[i]  # p (u' - u) / 2, the work at s = 1 less p u
-            lane.unconverged[i] = 1 if work[i] > 0.0 else 0
-            scale[i] = max(1.0 - work[i] / kinetic, 0.0) if work[i] > 0.0 < kinetic else 1.0
+            c = end_work[i] - work[i]
+            gains_energy = (lane.unconverged[i] != 0) & (c > 0.0)
+            scale[i] = max(1.0 - work[i] / c, 0.0) if gains_energy else 1.0
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
                 scale_impacts(operands_of(model, workspace, k), lane)

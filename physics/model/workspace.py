@@ -196,7 +196,7 @@ LANE = np.dtype(
         ("impact_restitution", "f8", (LANES,)),  # the largest
         ("impact_work", "f8", (LANES,)),  # J, of all impact impulses
         ("compression_work", "f8", (LANES,)),  # J, of those of compression
-        ("impact_power", "f8", (LANES,)),  # J, impulses times the velocities after them
+        ("end_work", "f8", (LANES,)),  # J, impulses times the velocities after them
         ("allowed_work", "f8", (LANES,)),  # J, upper bound for restitution
         ("restitution_scale", "f8", (LANES,)),  # fraction of restitution that this bound allows
     ],
