@@ -14,10 +14,18 @@ from physics.compiler.jit import stage
 
 # how often a waiting thread looks at a barrier before it offers its core to others: about 30 us
 _PATIENCE = 1000
+# and how often it offers it before it sleeps. A thread that waits without sleeping keeps its core. If
+# one that it waits for shares the other core with another program, every barrier would take as long
+# as that program's time slice, milliseconds. A sleep costs about 100 us, so short waits do without
+_OFFERS = 250
 
-_yield_core = types.ExternalFunction(
-    "sched_yield" if os.name == "posix" else "SwitchToThread", types.int32()
+_posix = os.name == "posix"
+_offer_core: Any = types.ExternalFunction(
+    "sched_yield" if _posix else "SwitchToThread", types.int32()
 )
+# Windows sleeps in milliseconds; 1 may take 15
+_sleep: Any = types.ExternalFunction("usleep" if _posix else "Sleep", types.int32(types.uint32))
+_NAP = 20 if _posix else 1
 
 
 def _pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -65,5 +73,7 @@ def wait_for_all(counters, index, threads):
     looks = 0
     while load_now(counters, index) < target:
         looks += 1
-        if looks > _PATIENCE:
-            _yield_core()
+        if looks > _PATIENCE + _OFFERS:
+            _sleep(_NAP)
+        elif looks > _PATIENCE:
+            _offer_core()

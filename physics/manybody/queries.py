@@ -10,7 +10,7 @@ from physics.analysis.diagnostics import Contacts, samples
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.manybody.reports import TOUCH, ReportArrays, make_touching
 from physics.manybody.simulation import CrowdSimulation
-from physics.model.workspace import CONTACT_ROW
+from physics.model.impulse_rows import CONTACT_ROW
 from physics.spring.contact_loop import REPORT
 
 Array = np.ndarray

@@ -17,11 +17,12 @@ from physics.model.build import dynamic_rows, per_world_dtype
 from physics.model.coefficients import dynamic_columns
 from physics.model.features import Features
 from physics.model.fields import field_rows
+from physics.model.impulse_rows import CONTACT_ROW
 from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.state import STARTS_ANEW
 from physics.model.tables import DYNAMIC_PER_WORLD, Model
-from physics.model.workspace import CONTACT_ROW, GIVEN, JOINT_WORK, SOLID, START, Workspace
+from physics.model.workspace import GIVEN, JOINT_WORK, SOLID, START, Workspace
 from physics.rotation import rotation_matrix
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters

@@ -10,6 +10,17 @@ import numpy as np
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.model.contact_memory import contact_memory
 from physics.model.features import ADAPTIVE, FIXED, RK4, Features, cached_by_features
+from physics.model.impulse_rows import (
+    BLOCK,
+    BLOCK_VECTOR,
+    CONTACT_ROW,
+    CONTACT_SUM,
+    CONTACT_SUMS,
+    MANIFOLD_POINT,
+    RESPONSE_ROW,
+    SEARCH,
+    TENSOR,
+)
 from physics.model.tables import Model
 
 Array = np.ndarray
@@ -86,92 +97,6 @@ HALF_PAIR_WORK = np.dtype(
     ],
     align=True,
 )
-
-# one row per candidate of a pair while a manifold of four points is chosen among them
-MANIFOLD_POINT = np.dtype(
-    [
-        ("position", "f8", (3,)),  # m, world frame
-        ("normal", "f8", (3,)),  # out of the surface of the pair's first half-pair, world frame
-        ("separation", "f8"),  # m
-        ("weight", "f8"),
-        ("face", "i8"),  # number of the face, counted from 1, that it belongs to; 0 before
-        ("chosen", "i8"),
-    ],
-    align=True,
-)
-
-# one row per slot, of the impulse law; all vectors in the world frame
-CONTACT_ROW = np.dtype(
-    [
-        ("normal", "f8", (3, LANES)),  # out of the surface
-        ("arm", "f8", (3, LANES)),  # m, from the owner's centre
-        ("surface_arm", "f8", (3, LANES)),  # m, from the surface's centre
-        ("separation", "f8", (LANES,)),  # m, negative if they overlap
-        ("weight", "f8", (LANES,)),
-        ("mass", "f8", (LANES,)),  # kg, effective mass along the normal
-        ("shear_mass", "f8", (LANES,)),  # kg, smallest effective mass across it
-        ("normal_impulse", "f8", (LANES,)),  # N s
-        ("tangential_impulse", "f8", (3, LANES)),  # N s
-        ("twist", "f8", (3, LANES)),  # N m s against rolling and spinning
-        # given in this step beyond the impulses above: by the relaxation sweep, and in a refresh
-        # by collisions
-        ("extra_impulse", "f8", (3, LANES)),  # N s
-        ("extra_angular_impulse", "f8", (3, LANES)),  # N m s
-        ("anchor", "f8", (3, LANES)),  # m, creep since the point came to stick
-        # of an instantaneous collision
-        ("impact_restitution", "f8", (LANES,)),  # -1 where nothing collides
-        ("normal_impact", "f8", (LANES,)),  # N s
-        ("tangential_impact", "f8", (3, LANES)),  # N s
-    ],
-    align=True,
-)
-
-# one row per slot, of Newton's method; vectors in the world frame
-RESPONSE_ROW = np.dtype(
-    [
-        ("pressing", "f8", (LANES,)),  # kg, response along the normal while it presses
-        ("sticking", "f8", (LANES,)),  # kg, response across it while it sticks
-        ("limit", "f8", (LANES,)),  # N s, of friction
-        ("approach", "f8", (LANES,)),  # m/s, below zero the contact presses
-        ("slip", "f8", (3, LANES)),  # m/s
-        ("along", "f8", (LANES,)),  # kg, response along the normal at this velocity
-        ("across", "f8", (LANES,)),  # kg, across it
-        ("change", "f8", (3, LANES)),  # N s: what is lacking, then what the solution adds
-        ("velocity_change", "f8", (3, LANES)),  # m/s, by the solution
-        ("kept_normal", "f8", (LANES,)),  # N s, before the first iteration
-        ("kept_tangential", "f8", (3, LANES)),  # N s, likewise
-    ],
-    align=True,
-)
-
-# one row per block of the matrix of Newton's method, on or below the diagonal
-BLOCK = np.dtype([("entry", "f8", (9 * LANES,)), ("used", "i8")], align=True)
-# one row per row of blocks: right side, then solution
-BLOCK_VECTOR = np.dtype([("component", "f8", (3, LANES))], align=True)
-# sums over the contacts of a half-pair, see impulse/contact_matrix.py
-CONTACT_SUM = np.dtype([("entry", "f8", (9 * LANES,))], align=True)
-CONTACT_SUMS = 8
-
-# a single row
-SEARCH = np.dtype(
-    [
-        ("moves", "i8", (LANES,)),  # 1: sweeps correct the impulses of this world
-        ("unsolved", "i8", (LANES,)),
-        ("deep", "i8", (LANES,)),  # 1: an overlap is deeper than the rounding of edges
-        ("lacking", "f8", (LANES,)),  # (N s)^2, sum over contacts
-        ("off", "f8", (LANES,)),  # (N s)^2, likewise of what a sweep would change
-        ("scale", "f8", (LANES,)),  # (N s)^2, sum of squares of normal impulses
-        ("part", "f8", (LANES,)),  # of the solution that is taken, see impulse/newton_step.py
-        ("slope", "f8", (LANES,)),  # J, of the energy there
-        ("steepest", "f8", (LANES,)),  # J, minus that at the start
-        ("least", "f8", (LANES,)),  # the part is between these two
-        ("most", "f8", (LANES,)),
-    ],
-    align=True,
-)
-
-# one row per solid
-TENSOR = np.dtype([("component", "f8", (6, LANES))], align=True)  # 1/(kg m^2): xx yy zz xy xz yz
 
 # a single row
 LANE = np.dtype(

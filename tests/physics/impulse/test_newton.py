@@ -9,7 +9,7 @@ import pytest
 from physics import PRESETS, Body, Box, Fidelity, Ground, Hinge, Material, Scene, World
 from physics.compiler.jit import LANES
 from physics.impulse import blocks
-from physics.model.workspace import BLOCK, BLOCK_VECTOR
+from physics.model.impulse_rows import BLOCK, BLOCK_VECTOR
 from physics.reference import scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import GRAVITY, settled
