@@ -14,9 +14,9 @@ from physics.compiler.jit import stage
 
 # how often a waiting thread looks at a barrier before it offers its core to others: about 30 us
 _PATIENCE = 1000
-# and how often it offers it before it sleeps. A thread that waits without sleeping keeps its core. If
-# one that it waits for shares the other core with another program, every barrier would take as long
-# as that program's time slice, milliseconds. A sleep costs about 100 us, so short waits do without
+# and how often it offers it before it sleeps. A thread that waits without sleeping keeps its core:
+# if one that it waits for shares the other core with another program, every barrier takes as long
+# as that program's time slice, milliseconds. A sleep takes about 100 us, so short waits do without
 _OFFERS = 250
 
 _posix = os.name == "posix"
