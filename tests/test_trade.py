@@ -119,3 +119,36 @@ def test_the_page_works_in_a_browser(browser_page):
     assert "error" in browser_page.inner_text("#tip")
     assert "×" in browser_page.inner_text("#table")
     assert all(url.startswith("file:") for url in browser_page.requests)
+
+
+def timed_row(label, error, one=math.nan, many=math.nan):
+    return store.Row(
+        "slide", OURS, "springs", label, "Fidelity()", "stable", error, 0.0, 0.0, one, many
+    )
+
+
+def test_a_trial_that_was_interrupted_keeps_what_was_measured(tmp_path):
+    path = tmp_path / "trade.csv"
+    first = store.Partial(path, "slide")
+    first.add(timed_row("2 ms", 0.01))
+    first.add(timed_row("1 ms", 0.001))
+    first.add(timed_row("2 ms", 0.01, 100.0, 1e4))
+    again = store.Partial(path, "slide")
+    assert [again.rows[k].label for k in again.rows] == ["2 ms", "1 ms"]
+    assert again.rows[timed_row("2 ms", 0.0).key] == timed_row("2 ms", 0.01, 100.0, 1e4)
+    assert math.isnan(again.rows[timed_row("1 ms", 0.0).key].one)
+    assert [again.rounds[key] for key in again.rows] == [1, 0]
+    again.remove()
+    assert not store.Partial(path, "slide").rows
+
+
+def test_settings_that_could_be_the_fastest_are_timed_again():
+    rows = [
+        timed_row("a", 0.1, 100, 1000),
+        timed_row("b", 0.2, 40, 900),  # close with many worlds
+        timed_row("c", 0.2, 40, 400),  # beaten in both
+        timed_row("d", 0.01, 10, 100),  # the most accurate
+        timed_row("e", 0.3),  # not timed
+    ]
+    timed = {r.label for r in rows if r.key in fronts.close(rows[:4], 2.0)}
+    assert timed == {"a", "b", "d"}

@@ -1,7 +1,7 @@
 """Which setting is cheapest at an error, and where we are ahead of MuJoCo or behind."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from benchmarks.report.tables import Cell, Table
 from benchmarks.trade.settings import OURS, PEER
@@ -35,6 +35,22 @@ def front(rows: Iterable[Row], engine: str, worlds: str) -> list[Row]:
             best = row.error
             found.append(row)
     return found
+
+
+def close(rows: Collection[Row], factor: float) -> set[str]:
+    """Keys of the settings that are less than `factor` times slower than any as accurate one.
+
+    Either with one world or with many.
+    """
+
+    def beaten(row: Row, worlds: str) -> bool:
+        return any(
+            rate(other, worlds) >= factor * rate(row, worlds)
+            for other in rows
+            if other.engine == row.engine and other.error <= row.error
+        )
+
+    return {row.key for row in rows if not all(beaten(row, worlds) for worlds in WORLDS)}
 
 
 def smallest(rows: Iterable[Row], engine: str) -> float:

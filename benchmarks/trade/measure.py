@@ -2,7 +2,6 @@
 
 import argparse
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
@@ -11,11 +10,14 @@ from benchmarks.report.results_file import save
 from benchmarks.trade import fronts, store
 from benchmarks.trade.cost import maker, many_worlds, one_world
 from benchmarks.trade.settings import Setting, options_text, ours, peers
-from benchmarks.trade.trial import Outcome, Trial, judge
+from benchmarks.trade.trial import Trial, judge
 from benchmarks.trade.trials import TRIALS
 from benchmarks.trade.tuning_peer import tuned
 
 ROUNDS = 2  # of timing; the faster one counts, as other load can only add time
+# in the second round only settings are measured that are at most so many times as slow as another
+# one of their engine with no larger error: no other can become the fastest
+CLOSE = 2.0
 WRONG = 1.0  # an error from which on a setting's cost means nothing
 
 
@@ -24,33 +26,48 @@ def settings(trial: Trial) -> list[Setting]:
     return [*ours(trial), *peers(trial, tuned)]
 
 
-def measured(trial: Trial) -> Iterator[store.Row]:
-    """Rows of a trial: first all errors, then the costs in rounds."""
-    chosen = settings(trial)
-    outcomes: dict[str, Outcome] = {}
+def measured(trial: Trial, path: Path) -> list[store.Row]:
+    """Rows of a trial: first all errors, then the costs in rounds.
+
+    What is measured is kept in a file beside `path` until the trial is complete; a run that was
+    interrupted continues there.
+    """
+    chosen = {setting.key: setting for setting in settings(trial)}
+    partial = store.Partial(path, trial.name)
+    missing = [key for key in chosen if key not in partial.rows]
     begin = perf_counter()
-    for k, setting in enumerate(chosen):
-        outcomes[setting.key] = judge(trial, maker(setting.options, trial))
-        _progress(trial, "errors", k + 1, len(chosen), begin)
-    worth = [s for s in chosen if outcomes[s.key].error < WRONG]
-    rates = {setting.key: (0.0, 0.0) for setting in worth}
-    begin = perf_counter()
+    for k, key in enumerate(missing):
+        partial.add(_judged(trial, chosen[key]))
+        _progress(trial, "errors", k + 1, len(missing), begin)
     for turn in range(ROUNDS):
-        for k, setting in enumerate(worth):
-            one, many = rates[setting.key]
-            one = max(one, one_world(trial, setting.options))
-            many = max(many, many_worlds(trial, setting.options))
-            rates[setting.key] = one, many
-            _progress(trial, "costs", turn * len(worth) + k + 1, ROUNDS * len(worth), begin)
+        rows = partial.rows
+        timed = [key for key in chosen if rows[key].error < WRONG]
+        if turn > 0:
+            close = fronts.close(rows.values(), CLOSE)
+            timed = [key for key in timed if key in close]
+        missing = [key for key in timed if partial.rounds[key] <= turn]
+        begin = perf_counter()
+        for k, key in enumerate(missing):
+            options, row = chosen[key].options, partial.rows[key]
+            one, many = one_world(trial, options), many_worlds(trial, options)
+            partial.add(row._replace(one=_larger(row.one, one), many=_larger(row.many, many)))
+            _progress(trial, f"costs, round {turn + 1}", k + 1, len(missing), begin)
     print()
-    for setting in chosen:
-        outcome = outcomes[setting.key]
-        one, many = rates.get(setting.key, (math.nan, math.nan))
-        yield store.Row(
-            trial.name, setting.engine, setting.curve, setting.label, options_text(setting.options),
-            outcome.status, outcome.error, outcome.energy, outcome.penetration, one, many,
-            outcome.note,
-        )  # fmt: skip
+    return [partial.rows[key] for key in chosen]
+
+
+def _judged(trial: Trial, setting: Setting) -> store.Row:
+    """The error of a setting, without its cost."""
+    outcome = judge(trial, maker(setting.options, trial))
+    return store.Row(
+        trial.name, setting.engine, setting.curve, setting.label, options_text(setting.options),
+        outcome.status, outcome.error, outcome.energy, outcome.penetration, math.nan, math.nan,
+        outcome.note,
+    )  # fmt: skip
+
+
+def _larger(before: float, rate: float) -> float:
+    return rate if math.isnan(before) else max(before, rate)
 
 
 def _progress(trial: Trial, what: str, done: int, count: int, begin: float) -> None:
@@ -76,12 +93,15 @@ def main(arguments: list[str]) -> None:
         rows = [row for row in rows if row.trial not in names]
         options.data.unlink(missing_ok=True)
         store.append(rows, options.data)
+        for name in names:
+            store.Partial(options.data, name).remove()
     done = {row.trial for row in rows}
     for name in names:
         if name in done:
             print(f"{name}: is in {options.data.name}; --restart measures it again")
             continue
-        store.append(list(measured(TRIALS[name])), options.data)
+        store.append(measured(TRIALS[name], options.data), options.data)
+        store.Partial(options.data, name).remove()
     if options.data == store.PATH:
         rows = store.load()
         save([fronts.ratios(rows, worlds) for worlds in fronts.WORLDS], run, keep=True)

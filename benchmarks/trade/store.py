@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -43,6 +44,11 @@ class Row(NamedTuple):
     many: float
     note: str = ""
 
+    @property
+    def key(self) -> str:
+        """A text that names the setting, see `Setting.key`."""
+        return f"{self.engine} | {self.curve} | {self.label}"
+
 
 _NUMBERS = ("error", "energy", "penetration", "one", "many")
 
@@ -78,6 +84,35 @@ def append(rows: Iterable[Row], path: Path = PATH) -> None:
             writer.writerow(Row._fields)
         for row in rows:
             writer.writerow(_cell(value) for value in row)
+
+
+class Partial:
+    """What is measured of a trial that isn't complete: a file beside that of the results.
+
+    Attributes:
+        rows: the newest row of each setting, by its key.
+        rounds: how often the cost of each setting was measured.
+    """
+
+    def __init__(self, path: Path, trial: str) -> None:
+        self._path = path.with_name(f"{path.stem} {trial}.partial.csv")
+        self.rows: dict[str, Row] = {}
+        self.rounds: Counter[str] = Counter()
+        for row in load(self._path):
+            self._take(row)
+
+    def add(self, row: Row) -> None:
+        """Keeps a row: first a setting's error alone, then with each round its costs, too."""
+        append([row], self._path)
+        self._take(row)
+
+    def remove(self) -> None:
+        """Deletes the file."""
+        self._path.unlink(missing_ok=True)
+
+    def _take(self, row: Row) -> None:
+        self.rounds[row.key] += row.key in self.rows
+        self.rows[row.key] = row
 
 
 def _cell(value: str | float) -> str:
