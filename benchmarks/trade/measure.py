@@ -102,8 +102,11 @@ def main(arguments: list[str]) -> None:
             continue
         store.append(measured(TRIALS[name], options.data), options.data)
         store.Partial(options.data, name).remove()
+    order = list(TRIALS)
+    rows = sorted(store.load(options.data), key=lambda row: order.index(row.trial))
+    options.data.unlink(missing_ok=True)
+    store.append(rows, options.data)
     if options.data == store.PATH:
-        rows = store.load()
         save([fronts.ratios(rows, worlds) for worlds in fronts.WORLDS], run, keep=True)
         print(
             f"written: {store.PATH.name} and the tables of ratios; benchmarks.plots and "
