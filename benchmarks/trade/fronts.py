@@ -37,7 +37,7 @@ def front(rows: Iterable[Row], engine: str, worlds: str) -> list[Row]:
     return found
 
 
-def close(rows: Collection[Row], factor: float) -> set[str]:
+def close(rows: Collection[Row], factor: float) -> set[tuple[str, str, str]]:
     """Keys of the settings that are less than `factor` times slower than any as accurate one.
 
     Either with one world or with many.

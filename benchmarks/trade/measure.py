@@ -15,8 +15,8 @@ from benchmarks.trade.trials import TRIALS
 from benchmarks.trade.tuning_peer import tuned
 
 ROUNDS = 2  # of timing; the faster one counts, as other load can only add time
-# in the second round only settings are measured that are at most so many times as slow as another
-# one of their engine with no larger error: no other can become the fastest
+# the second round leaves out settings that are so many times slower than one of their engine with
+# no larger error: other load during the first round doesn't explain that
 CLOSE = 2.0
 WRONG = 1.0  # an error from which on a setting's cost means nothing
 
@@ -34,7 +34,11 @@ def measured(trial: Trial, path: Path) -> list[store.Row]:
     """
     chosen = {setting.key: setting for setting in settings(trial)}
     partial = store.Partial(path, trial.name)
-    missing = [key for key in chosen if key not in partial.rows]
+    missing = [
+        key
+        for key, setting in chosen.items()
+        if key not in partial.rows or partial.rows[key].options != options_text(setting.options)
+    ]
     begin = perf_counter()
     for k, key in enumerate(missing):
         partial.add(_judged(trial, chosen[key]))
@@ -91,8 +95,7 @@ def main(arguments: list[str]) -> None:
     rows = store.load(options.data)
     if options.restart:
         rows = [row for row in rows if row.trial not in names]
-        options.data.unlink(missing_ok=True)
-        store.append(rows, options.data)
+        store.replace_all(rows, options.data)
         for name in names:
             store.Partial(options.data, name).remove()
     done = {row.trial for row in rows}
@@ -104,8 +107,7 @@ def main(arguments: list[str]) -> None:
         store.Partial(options.data, name).remove()
     order = list(TRIALS)
     rows = sorted(store.load(options.data), key=lambda row: order.index(row.trial))
-    options.data.unlink(missing_ok=True)
-    store.append(rows, options.data)
+    store.replace_all(rows, options.data)
     if options.data == store.PATH:
         save([fronts.ratios(rows, worlds) for worlds in fronts.WORLDS], run, keep=True)
         print(

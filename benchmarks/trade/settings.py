@@ -32,9 +32,9 @@ class Setting(NamedTuple):
     options: Fidelity | MujocoOptions
 
     @property
-    def key(self) -> str:
-        """A text that names the setting in the results."""
-        return f"{self.engine} | {self.curve} | {self.label}"
+    def key(self) -> tuple[str, str, str]:
+        """Engine, curve and label, which name the setting in the results."""
+        return self.engine, self.curve, self.label
 
 
 def milliseconds(step: float) -> str:

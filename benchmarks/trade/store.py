@@ -45,9 +45,9 @@ class Row(NamedTuple):
     note: str = ""
 
     @property
-    def key(self) -> str:
-        """A text that names the setting, see `Setting.key`."""
-        return f"{self.engine} | {self.curve} | {self.label}"
+    def key(self) -> tuple[str, str, str]:
+        """Engine, curve and label, which name a setting."""
+        return self.engine, self.curve, self.label
 
 
 _NUMBERS = ("error", "energy", "penetration", "one", "many")
@@ -86,6 +86,14 @@ def append(rows: Iterable[Row], path: Path = PATH) -> None:
             writer.writerow(_cell(value) for value in row)
 
 
+def replace_all(rows: Iterable[Row], path: Path = PATH) -> None:
+    """Replaces a file; an interruption leaves the one before."""
+    unfinished = path.with_suffix(".tmp")
+    unfinished.unlink(missing_ok=True)
+    append(rows, unfinished)
+    unfinished.replace(path)
+
+
 class Partial:
     """What is measured of a trial that isn't complete: a file beside that of the results.
 
@@ -96,8 +104,8 @@ class Partial:
 
     def __init__(self, path: Path, trial: str) -> None:
         self._path = path.with_name(f"{path.stem} {trial}.partial.csv")
-        self.rows: dict[str, Row] = {}
-        self.rounds: Counter[str] = Counter()
+        self.rows: dict[tuple[str, str, str], Row] = {}
+        self.rounds: Counter[tuple[str, str, str]] = Counter()
         for row in load(self._path):
             self._take(row)
 
@@ -111,7 +119,7 @@ class Partial:
         self._path.unlink(missing_ok=True)
 
     def _take(self, row: Row) -> None:
-        self.rounds[row.key] += row.key in self.rows
+        self.rounds[row.key] = 0 if math.isnan(row.one) else self.rounds[row.key] + 1
         self.rows[row.key] = row
 
 
