@@ -10,8 +10,8 @@ from physics import PRESETS, Fidelity
 from physics.scene.fidelity import FIND_IMPACTS
 
 OURS, PEER = "rigid-envs", "MuJoCo"
-# s; each divides the 40 ms between two readings
-STEPS = (0.02, 0.01, 8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3, 0.125e-3)
+# s; each divides the 40 ms between two readings. A trial has those up to its longest one
+STEPS = (0.04, 0.02, 0.01, 8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3, 0.125e-3)
 FINEST = 0.0625e-3  # s, of ours alone
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # of the adaptive integrator
 
@@ -88,6 +88,10 @@ _PEER_INTEGRATORS = ("Euler", "implicitfast", "implicit", "RK4")
 BOUNCES = (0.03, 0.1, 0.3)
 
 
+def _steps(trial: Trial) -> list[float]:
+    return [step for step in STEPS if step <= trial.longest]
+
+
 def ours(trial: Trial) -> Iterator[Setting]:
     """Our settings for a trial: the presets, then every curve."""
     for name, fidelity in PRESETS.items():
@@ -96,7 +100,7 @@ def ours(trial: Trial) -> Iterator[Setting]:
     for curve, fidelity in curves.items():
         if fidelity.time_control in FIND_IMPACTS and not trial.events:
             continue
-        for step in (*STEPS, FINEST):
+        for step in (*_steps(trial), FINEST):
             yield Setting(OURS, curve, milliseconds(step), replace(fidelity, substep=step))
     if trial.joints and not trial.scene.joints:
         for tolerance in TOLERANCES:
@@ -116,11 +120,11 @@ def peers(
     """
     if trial.joints:
         for integrator in _PEER_INTEGRATORS:
-            for step in STEPS:
+            for step in _steps(trial):
                 yield Setting(PEER, integrator, milliseconds(step), MujocoOptions(step, integrator))
         return
     for curve, changed in _PEER_CURVES.items():
-        for step in STEPS:
+        for step in _steps(trial):
             options = MujocoOptions(step, **changed)
             if curve.startswith("stiff"):  # twice the step is the shortest that it accepts
                 options = replace(options, solref=(2.0 * step, 1.0))
@@ -128,7 +132,7 @@ def peers(
     if trial.restitution is None:
         return
     for ratio in BOUNCES:
-        for step in STEPS:
+        for step in _steps(trial):
             solref = tuned(trial.restitution, step, ratio)
             if solref is not None:
                 options = MujocoOptions(step, solref=solref, solimp=(0.999, 0.999, 0.001))

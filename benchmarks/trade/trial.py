@@ -82,6 +82,7 @@ class Trial:
         settle: s before the start.
         time: s that are judged.
         timed: s after the start that the cost is measured on; None: all of `time`.
+        longest: s, longest step that is measured.
         restitution: e of the impacts, for which the peer's contacts are tuned; None: no impacts.
         grip: the peer's fingers press with a force instead of following a path.
         joints: the scene is about rotation or joints, not contact.
@@ -100,6 +101,7 @@ class Trial:
     settle: float = 0.0
     time: float = 1.0
     timed: float | None = None
+    longest: float = 0.02
     restitution: float | None = None
     grip: bool = False
     joints: bool = False
