@@ -1,15 +1,19 @@
-"""How policies carry over between fidelities: python -m benchmarks.policies [--tasks push ...].
+"""How policies carry over between fidelities: python -m benchmarks.policies [--train push ...].
 
-Trains a policy of each task at every preset, with the settings of configs/ppo.yaml, and measures
-its success at every preset: rows are where it was trained, columns where it acts. With --finish,
-training at "fast" that ends with a stage at "accurate" is compared with training at "accurate"
-throughout: wall time, and success at "accurate". Runs are kept in a folder, and a run that was
-interrupted resumes; what is measured is saved in benchmarks/results.json.
+Measures the success of every policy in results/ at every preset. With --train, a policy of each
+task that is named is trained at every preset, with the settings of configs/ppo.yaml: rows are where
+it was trained, columns where it acts. And training at "fast" that ends with a stage at "accurate"
+is compared with training at "accurate" throughout: wall time, and success at "accurate". Runs are
+kept in a folder, and a run that was interrupted resumes; what is measured is saved in
+benchmarks/results.json.
 """
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.results_file import save
@@ -22,6 +26,8 @@ from training.sb3.train import resume, train
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 
+SHIPPED = Path(__file__).parents[1] / "results"
+ALGORITHMS = ("ppo", "sac")
 EPISODES = 1000
 # steps of the last stage of --finish, as a fraction of those of a whole training
 LAST_STAGE = 0.1
@@ -73,16 +79,38 @@ def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
     return run, seconds
 
 
-def success(run: RunFolder, preset: str) -> float:
+def success(run: RunFolder, preset: str, episodes: int = EPISODES) -> float:
     """Fraction of episodes whose goal is met at the end, at a preset."""
-    found = evaluate(trained_policy(run.path), EPISODES, quiet=True, fidelity=preset)
+    found = evaluate(trained_policy(run.path), episodes, quiet=True, fidelity=preset)
     return float(found.success_at_end.mean())
 
 
-def matrix(task: str, presets: list[str], folder: Path) -> Table:
+def shipped() -> Table:
+    """Success of the policies in results/: those of an algorithm share the episodes of a row."""
+    rows: list[list[Cell]] = []
+    for algorithm in ALGORITHMS:
+        for task in TASKS:
+            name = _id(task).replace("/", "-")
+            runs = [RunFolder(path) for path in sorted((SHIPPED / algorithm).glob(f"{name}_seed*"))]
+            if not runs:
+                continue
+            config = runs[0].config()
+            last = {**config.env_kwargs, **config.finetune_env_kwargs}["fidelity"]
+            episodes = EPISODES // len(runs)
+            row: list[Cell] = [f"{task.capitalize()}, {algorithm.upper()}", last]
+            for preset in PRESETS:
+                row.append(float(np.mean([success(run, preset, episodes) for run in runs])))
+                print(row[0], preset, row[-1], flush=True)
+            rows.append(row)
+    columns = ["policy", "trained at", *(f"success at {name}" for name in PRESETS)]
+    title = f"The policies in results/, {EPISODES:,} episodes of all seeds"
+    return Table("policies", title, columns, rows)
+
+
+def matrix(task: str, folder: Path) -> Table:
     """Success of the policies of a task."""
     rows: list[list[Cell]] = []
-    for preset in presets:
+    for preset in PRESETS:
         run, seconds = trained(config_at(task, preset), folder / f"{task}_{preset}")
         rows.append([preset, seconds, *(success(run, other) for other in PRESETS)])
         print(task, *rows[-1], flush=True)
@@ -113,20 +141,21 @@ def main() -> None:
         prog="python -m benchmarks.policies", description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("--tasks", nargs="+", choices=TASKS, default=["push", "throw"])
-    parser.add_argument("--presets", nargs="+", choices=list(PRESETS), default=list(PRESETS))
-    parser.add_argument("--finish", action="store_true", help="where to train, in wall time")
+    parser.add_argument("--train", nargs="+", choices=TASKS, default=[], metavar="task",
+                        help=f"train policies of it instead: {', '.join(TASKS)}")  # fmt: skip
     parser.add_argument("--folder", type=Path, default=Path("runs/policies"), help="of the runs")
     options = parser.parse_args()
     this_run = provenance()
     print(describe(this_run))
-    for task in options.tasks:
-        tables = [matrix(task, options.presets, options.folder)]
-        if options.finish:
-            tables.append(finishing(task, options.folder))
-        for table in tables:
-            print(plain(table) + "\n", flush=True)
-        save(tables, this_run, keep=True)
+    makers = [
+        partial(make, task, options.folder)
+        for task in options.train
+        for make in (matrix, finishing)
+    ]
+    for make_table in makers or [shipped]:
+        table = make_table()
+        print(plain(table) + "\n", flush=True)
+        save([table], this_run, keep=True)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import hypothesis
 import pytest
 
 from tests.browser import browser, browser_page  # noqa: F401  (fixtures of all tests)
+from tests.shared_kernels import shared_kernels  # noqa: F401
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # two workers share two cores

@@ -26,7 +26,6 @@ from physics.compiler.jit import LANES
 from physics.reference import scenes
 from physics.reference.scenes import GRAVITY
 from physics.scene.parameters import with_parameters
-from tests.physics.bystanders import with_bystanders
 from tests.physics.test_world import digests
 
 COUNT = LANES + 3  # a group, and a part of one
@@ -128,19 +127,6 @@ def test_a_world_with_parameters_is_a_world_of_a_scene_that_has_them_built_in(
         assert worlds.penetration()[i] == built.penetration()[0]
         assert worlds.largest_stable_step(i) == built.largest_stable_step()
         assert worlds.contacts(i).force.tobytes() == built.contacts().force.tobytes()
-
-
-@pytest.mark.parametrize("fidelity", ["balanced", "solid"])
-def test_scenes_with_bystanders_share_the_kernels_of_the_scene_of_everything(fidelity):
-    for scene in (
-        scenes.block_on_ground(),
-        Scene([Body(Sphere(0.02))], drives=[Drive(Capsule(0.01, 0.02), 0.1, 20.0)]),
-        Scene([Body(Box((0.02,) * 3))], drives=[Drive(Box((0.02,) * 3), 0.1, 20.0)]),
-    ):
-        assert (
-            World(with_bystanders(scene), fidelity).features
-            == World(everything(), fidelity).features
-        )
 
 
 def test_neighbours_and_threads_change_no_bit():

@@ -15,6 +15,7 @@ from physics import (
     Drive,
     Fidelity,
     Ground,
+    Material,
     Scene,
     SimulationDiverged,
     Sphere,
@@ -479,6 +480,10 @@ def test_a_scene_pays_only_for_what_it_needs():
     assert (push.drives, push.box, push.sphere) == (True, True, False)
     assert features_of(scenes.two_cubes(), Fidelity(geometry="particle")).particles
     assert features_of(scenes.block_on_ground(), Fidelity(damping="dashpot")).dashpot
+    for name in ("rolling_resistance", "spinning_resistance"):
+        resisted = Body(BALL, material=Material(**{name: 1e-3}))
+        assert features_of(Scene([resisted], [Ground()])).resistance
+    assert not rough.resistance
 
 
 def test_materials_and_sizes_compile_nothing_new():

@@ -8,26 +8,16 @@ import pytest
 from physics import Body, Box, Ground, Hinge, Material, Motor, Scene, Slider, World
 from tests.physics.constraints.jointed import about_y, energy
 
+pytestmark = pytest.mark.usefixtures("shared_kernels")
+
 CUBE = Box((0.05, 0.05, 0.05))
 LAWS = pytest.mark.parametrize("fidelity", ["balanced", "solid"])
 
 
 def world_of(bodies, joints, fidelity, count=1, gravity=(0.0, 0.0, -9.81)):
-    """A world with ground; all of these share a kernel per contact law.
-
-    For that, two boxes out of reach have what not every scene has: each other, three moments of
-    inertia, restitution, a hinge with limits and a motor that holds it.
-    """
+    """A world with ground."""
     ground = Ground(Material(0.5, restitution=0.0))
-    far = [(0.0, 50.0, 50.0), (1.0, 50.0, 50.0)]
-    brick, bouncy = Box((0.05, 0.04, 0.03)), Material(0.5, 0.5)
-    idle = [Body(brick, mass=1.0, position=point, material=bouncy) for point in far]
-    held = [
-        Hinge(len(bodies) + i, None, far[i], (0, 1, 0), limits=(-1, 1), motor=Motor(1.0, 0.0))
-        for i in range(2)
-    ]
-    scene = Scene([*bodies, *idle], [ground], gravity=gravity, joints=[*joints, *held])
-    return World(scene, fidelity, count)
+    return World(Scene(bodies, [ground], gravity=gravity, joints=joints), fidelity, count)
 
 
 @LAWS

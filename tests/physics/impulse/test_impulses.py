@@ -10,7 +10,8 @@ from physics import PRESETS, Body, Box, Capsule, Fidelity, Ground, Material, Sce
 from physics.reference import closed_forms, scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import GRAVITY, settled
-from tests.physics.bystanders import with_bystanders
+
+pytestmark = pytest.mark.usefixtures("shared_kernels")
 
 SOLID = PRESETS["solid"]
 # with fewer particles a cube would stand on so small a base that it topples
@@ -195,7 +196,7 @@ def test_a_heap_of_all_shapes_comes_to_rest():
         Body(shapes[i % 3], mass=0.1, position=(0.01 * i, 0.0, 0.05 + 0.07 * i), material=material)
         for i in range(9)
     ]
-    world = World(with_bystanders(Scene(bodies, [Ground(material)])), SOLID)
+    world = World(Scene(bodies, [Ground(material)]), SOLID)
     world.advance(6.0)
     still = [i for i in range(9) if i % 3 == 1]  # the others may roll on
     assert np.abs(world.linear_velocity[0, still]).max() < 0.05

@@ -27,11 +27,16 @@ from physics import (
     World,
 )  # fmt: skip
 from physics.analysis.lane_queries import LaneQueries
+from physics.manybody import kinds
 from physics.manybody import simulation as many
 from physics.manybody.mechanisms import find_mechanisms
+from physics.model.build import couplings
 from physics.motion.drive_commands import make_move_command, worlds_last
 from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import HALF
+
+pytestmark = pytest.mark.usefixtures("shared_kernels", "with_all_couplings")
+
 
 CUBE = Box((HALF, HALF, HALF))
 ROUGH = Material(friction=0.5)
@@ -73,6 +78,14 @@ def workshop() -> Scene:
         SurfaceDrag(1.2, 1.0, body=5),
     ]
     return Scene(bodies, [Ground(ROUGH)], drives=[*drives, gripper], joints=joints, fields=fields)
+
+
+@pytest.fixture(scope="module")
+def with_all_couplings():
+    """All worlds of many bodies get the kernels of `workshop`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kinds, "couplings", lambda scene: couplings(workshop()))
+        yield
 
 
 def move(simulation, scene):

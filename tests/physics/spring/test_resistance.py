@@ -8,7 +8,8 @@ import pytest
 from physics import Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
 from physics.reference import closed_forms, scenes
 from physics.reference.scenes import GRAVITY, settled
-from tests.physics.bystanders import with_bystanders
+
+pytestmark = pytest.mark.usefixtures("shared_kernels")
 
 RADIUS, LENGTH = 0.05, 0.002  # m
 TOLERANCE = {"balanced": 3e-3, "accurate": 5e-4, "solid": 5e-4}
@@ -31,7 +32,7 @@ def roll(world, velocity, spin):
 
 @pytest.mark.parametrize("fidelity", TOLERANCE)
 def test_a_rolling_ball_stops_after_the_way_that_its_resistance_gives(fidelity):
-    world = settled(with_bystanders(ball(rolling_resistance=LENGTH)), fidelity)
+    world = settled(ball(rolling_resistance=LENGTH), fidelity)
     start = world.position[0, 0, 0]
     roll(world, (1.0, 0, 0), (0, 1.0 / RADIUS, 0))
     world.advance(6.0)
@@ -44,7 +45,7 @@ def test_a_rolling_ball_stops_after_the_way_that_its_resistance_gives(fidelity):
 
 @pytest.mark.parametrize("fidelity", TOLERANCE)
 def test_a_spinning_ball_slows_down_evenly_and_stops(fidelity):
-    world = settled(with_bystanders(ball(spinning_resistance=LENGTH)), fidelity)
+    world = settled(ball(spinning_resistance=LENGTH), fidelity)
     roll(world, (0, 0, 0), (0.0, 0.0, 20.0))
     lasts = closed_forms.spinning_time(20.0, LENGTH, RADIUS, GRAVITY)
     world.advance(0.5 * lasts)
@@ -57,23 +58,16 @@ def test_a_spinning_ball_slows_down_evenly_and_stops(fidelity):
 def test_a_ball_lies_still_on_a_slope_below_c_over_r_and_rolls_above(fidelity):
     slope = LENGTH / RADIUS
     below, angle = math.atan(0.9 * slope), math.atan(1.5 * slope)
-    world = settled(with_bystanders(ball(below, rolling_resistance=LENGTH)), fidelity, time=5.0)
+    world = settled(ball(below, rolling_resistance=LENGTH), fidelity, time=5.0)
     start = world.position[0, 0].copy()
     world.advance(5.0)
     assert np.abs(world.position[0, 0] - start).max() < 1e-9
-    world = settled(with_bystanders(ball(angle, rolling_resistance=LENGTH)), fidelity)
+    world = settled(ball(angle, rolling_resistance=LENGTH), fidelity)
     before = world.linear_velocity[0, 0, 0]
     world.advance(1.0)
     expected = 5 / 7 * GRAVITY * (math.sin(angle) - slope * math.cos(angle))
     gained = world.linear_velocity[0, 0, 0] - before
     assert gained == pytest.approx(expected, rel=2 * TOLERANCE[fidelity])
-
-
-@pytest.mark.parametrize("fidelity", ["balanced", "solid"])
-def test_without_resistance_nothing_of_it_is_compiled_in(fidelity):
-    assert not World(ball(), fidelity).features.resistance
-    assert World(ball(rolling_resistance=1e-3), fidelity).features.resistance
-    assert World(ball(spinning_resistance=1e-3), fidelity).features.resistance
 
 
 def test_resistance_acts_on_both_bodies_of_a_pair():
@@ -84,7 +78,7 @@ def test_resistance_acts_on_both_bodies_of_a_pair():
              angular_velocity=(3.0, 0.0, 40.0 * x), material=stuff)
         for x in (-0.051, 0.051)
     ]  # fmt: skip
-    world = World(with_bystanders(Scene(bodies, gravity=(0, 0, 0))))
+    world = World(Scene(bodies, gravity=(0, 0, 0)))
     momentum, spin = world.angular_momentum(), np.ptp(world.angular_velocity[0, :2, 2])
     world.advance(0.2)
     np.testing.assert_allclose(world.angular_momentum(), momentum, atol=1e-15)

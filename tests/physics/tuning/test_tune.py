@@ -25,6 +25,8 @@ from physics.tuning.candidates import can_touch, families
 from physics.tuning.metrics import METRICS
 from physics.tuning.motion import Course, Motion, simulate
 
+pytestmark = pytest.mark.usefixtures("shared_kernels")
+
 SPEED = 1.0
 SLIDE = block_on_ground(linear_velocity=(SPEED, 0, 0))
 ORBIT = Scene(
