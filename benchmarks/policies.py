@@ -9,6 +9,7 @@ benchmarks/results.json.
 """
 
 import argparse
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.results_file import save
 from benchmarks.report.tables import Cell, Table, plain
 from physics import PRESETS
+from training.policies.policy import Policy
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.runs.run_folder import RunFolder
@@ -29,7 +31,7 @@ from training.settings.config_file import load_config
 SHIPPED = Path(__file__).parents[1] / "results"
 ALGORITHMS = ("ppo", "sac")
 EPISODES = 1000
-# steps of the last stage of --finish, as a fraction of those of a whole training
+# steps of a last stage at another preset, as a fraction of those of a whole training
 LAST_STAGE = 0.1
 TASKS = ("push", "throw", "stack")
 
@@ -79,9 +81,9 @@ def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
     return run, seconds
 
 
-def success(run: RunFolder, preset: str, episodes: int = EPISODES) -> float:
+def success(policy: Policy, preset: str, episodes: int = EPISODES) -> float:
     """Fraction of episodes whose goal is met at the end, at a preset."""
-    found = evaluate(trained_policy(run.path), episodes, quiet=True, fidelity=preset)
+    found = evaluate(policy, episodes, quiet=True, fidelity=preset)
     return float(found.success_at_end.mean())
 
 
@@ -91,19 +93,20 @@ def shipped() -> Table:
     for algorithm in ALGORITHMS:
         for task in TASKS:
             name = _id(task).replace("/", "-")
-            runs = [RunFolder(path) for path in sorted((SHIPPED / algorithm).glob(f"{name}_seed*"))]
-            if not runs:
+            files = sorted((SHIPPED / algorithm).glob(f"{name}_seed*/policy.policy"))
+            if not files:
                 continue
-            config = runs[0].config()
-            last = {**config.env_kwargs, **config.finetune_env_kwargs}["fidelity"]
-            episodes = EPISODES // len(runs)
+            policies = [trained_policy(file) for file in files]
+            last = policies[0].env_kwargs["fidelity"]
             row: list[Cell] = [f"{task.capitalize()}, {algorithm.upper()}", last]
             for preset in PRESETS:
-                row.append(float(np.mean([success(run, preset, episodes) for run in runs])))
+                row.append(
+                    float(np.mean([success(one, preset, EPISODES // 3) for one in policies]))
+                )
                 print(row[0], preset, row[-1], flush=True)
             rows.append(row)
     columns = ["policy", "trained at", *(f"success at {name}" for name in PRESETS)]
-    title = f"The policies in results/, {EPISODES:,} episodes of all seeds"
+    title = f"The policies in results/, {EPISODES // 3} episodes of each of 3 seeds"
     return Table("policies", title, columns, rows)
 
 
@@ -112,7 +115,9 @@ def matrix(task: str, folder: Path) -> Table:
     rows: list[list[Cell]] = []
     for preset in PRESETS:
         run, seconds = trained(config_at(task, preset), folder / f"{task}_{preset}")
-        rows.append([preset, seconds, *(success(run, other) for other in PRESETS)])
+        rows.append(
+            [preset, seconds, *(success(trained_policy(run.path), other) for other in PRESETS)]
+        )
         print(task, *rows[-1], flush=True)
     columns = ["trained at", "s of training", *(f"success at {name}" for name in PRESETS)]
     title = f"{task.capitalize()}, PPO, {EPISODES:,} episodes"
@@ -129,7 +134,7 @@ def finishing(task: str, folder: Path) -> Table:
     rows: list[list[Cell]] = []
     for name, (config, place) in ways.items():
         run, seconds = trained(config, folder / place)
-        rows.append([name, seconds, success(run, "accurate")])
+        rows.append([name, seconds, success(trained_policy(run.path), "accurate")])
         print(task, *rows[-1], flush=True)
     columns = ["trained at", "s of training", "success at accurate"]
     return Table(f"finishing {task}", f"{task.capitalize()}: where to train", columns, rows)
@@ -147,7 +152,7 @@ def main() -> None:
     options = parser.parse_args()
     this_run = provenance()
     print(describe(this_run))
-    makers = [
+    makers: list[Callable[[], Table]] = [
         partial(make, task, options.folder)
         for task in options.train
         for make in (matrix, finishing)

@@ -14,7 +14,8 @@ def shared_kernels():
 
     By default a kernel has the parts that its scene needs, and takes up to half a minute to
     compile. The tests of a module that uses this fixture are about laws of motion, which don't
-    depend on what else a kernel can do; see test_parameters.
+    depend on what else a kernel can do: tests/physics/test_world.py compares kernels that differ
+    in parts that a scene doesn't need.
     """
     needed = build._features
 

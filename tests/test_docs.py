@@ -12,9 +12,6 @@ from physics.tuning import tune as tuning
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
-
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
 
 
@@ -22,7 +19,7 @@ WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
 def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").symlink_to(ROOT / "results")
-    # two kernels instead of six
+    # of all that `tune` tries on docs/trade.md: two kernels instead of six
     families = tuning.families
     monkeypatch.setattr(
         tuning,

@@ -10,8 +10,6 @@ from physics.reference.measures import creep, rebounds, slide, stand
 from physics.reference.promises import PROMISES
 from physics.reference.scenes import CUBE, block_on_ground
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 MILLIMETRE = 1e-3
 
 
