@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, at, large_entry
 from physics.impulse.contact_rows import make_contact_rows
@@ -50,8 +51,9 @@ def _make_elastic_energy(features: Features) -> Any:
     @large_entry
     def elastic_energy(all_model, state, workspace, chosen, rows, energy, first, last):
         _ = sources
+        state, workspace = bundle(state), bundle(workspace)
         for g in range(first, last):
-            model = constants(all_model, g)
+            model = bundle(constants(all_model, g))
             if load(model, state, workspace, chosen, g) == 0:
                 continue
             write_static_frames(model, workspace)

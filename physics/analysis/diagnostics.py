@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry
 from physics.impulse.contact_rows import make_contact_rows
@@ -57,7 +58,8 @@ def _make_report(features: Features) -> Any:
     @large_entry
     def report(group, state, workspace, chosen, rows):
         _ = sources
-        model = constants(group, 0)
+        state, workspace = bundle(state), bundle(workspace)
+        model = bundle(constants(group, 0))
         write_static_frames(model, workspace)
         load(model, state, workspace, chosen, 0)
         write_drive_frames(model, workspace)

@@ -6,6 +6,7 @@ memory, one lane per pair. Then the stages for worlds side by side do the rest.
 
 from physics.collision.broadphase import make_search_half_pair, renewal, spend_skin
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, sequence, stage
 from physics.manybody.tables import (
     ANGULAR_VELOCITY,
@@ -210,9 +211,9 @@ def make_batch_forces(features):
         all_model, state, workspace, crowd, pairs, b, h, elapsed, starts_collision_step, remembers
     ):
         kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
-        own = state_of(state, pairs, kind, b)
+        model = bundle(model_of(all_model, kind))
+        mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
+        own = bundle(state_of(state, pairs, kind, b))
         touching = find_candidates(model, own, mine, crowd, pairs, b, starts_collision_step)
         wrench, last = pairs.wrench[b], kind.half_pair_count - 1
         if touching:

@@ -5,6 +5,7 @@ The stages of a lane group move them as the bodies of LANES small worlds.
 
 import math
 
+from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, sequence, stage
 from physics.constraints.joint_drift import make_joint_drift
 from physics.constraints.joint_forces import make_joint_forces
@@ -153,7 +154,8 @@ def make_move_group(features):
 
     @sequence
     def move_group(model, workspace, crowd, g, before, h):
-        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        own = bundle(group_model(model, crowd, g))
+        mine = bundle(group_workspace(workspace, crowd, g))
         kick(own, mine, before)
         if joints and crowd.group[g].joint_count > 0:
             joint_drift(own, mine, h)
@@ -182,7 +184,9 @@ def make_place_group(features):
                 for c in range(3):
                     solid.displacement[c, i] = 0.0
                 solid.rotation_bound[i] = 0.0
-        kinematics(group_model(model, crowd, g), group_workspace(workspace, crowd, g))
+        kinematics(
+            bundle(group_model(model, crowd, g)), bundle(group_workspace(workspace, crowd, g))
+        )
         for m in blocks_of(crowd, g):
             write_frames(crowd, m)
 
@@ -199,7 +203,8 @@ def make_known_forces(features):
     @sequence
     def known_forces(model, workspace, crowd, g, drifted):
         """The last drift took `drifted` s, 0 in a refresh."""
-        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        own = bundle(group_model(model, crowd, g))
+        mine = bundle(group_workspace(workspace, crowd, g))
         present_velocities(own, mine, lag * drifted)
         gravity(own, mine)
         fields(own, mine)
@@ -224,8 +229,9 @@ def make_hold_joints(features):
     def hold_joints(model, state, workspace, crowd, g, h, drifted):
         """Steps take `h` s, the last drift took `drifted` s."""
         if joints and crowd.group[g].joint_count > 0:
-            own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
-            joint_forces(own, group_state(state, crowd, g), mine, h, drifted)
+            own = bundle(group_model(model, crowd, g))
+            mine = bundle(group_workspace(workspace, crowd, g))
+            joint_forces(own, bundle(group_state(state, crowd, g)), mine, h, drifted)
 
     return hold_joints
 
@@ -238,7 +244,8 @@ def make_end_step(features):
     @sequence
     def end_step(model, workspace, crowd, g, drifted, time):
         """The last drift took `drifted` s, the kick takes `time` s."""
-        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        own = bundle(group_model(model, crowd, g))
+        mine = bundle(group_workspace(workspace, crowd, g))
         couple_fingers(own, mine, drifted)
         if time > 0.0:
             kick(own, mine, time)

@@ -4,6 +4,7 @@ Velocities stand in `Crowd.frame`. Joints keep the rates that they had, see
 `constraints.joint_velocities`, and the fingers of a gripper move as one solid.
 """
 
+from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, sequence, stage
 from physics.constraints.joint_velocities import (
     make_begin_hold,
@@ -89,7 +90,8 @@ def make_begin_joints(features):
             first, last = share(0, crowd.group.shape[0], team)
             for g in range(first, last):
                 if crowd.group[g].joint_count > 0:
-                    own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+                    own = bundle(group_model(model, crowd, g))
+                    mine = bundle(group_workspace(workspace, crowd, g))
                     gather_group_speeds(crowd, g)
                     if clears:
                         clear_hold(own, mine)
@@ -121,7 +123,8 @@ def make_keep_joints(features):
             else:
                 found = find_stirred(crowd, g, since, mask)
             if found > 0:
-                own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+                own = bundle(group_model(model, crowd, g))
+                mine = bundle(group_workspace(workspace, crowd, g))
                 gather_group_speeds(crowd, g)
                 for i in range(LANES):
                     lane.impact_work[i] = 0.0
@@ -145,7 +148,8 @@ def make_end_joints(features):
             first, last = share(0, crowd.group.shape[0], team)
             for g in range(first, last):
                 if crowd.group[g].joint_count > 0:
-                    own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+                    own = bundle(group_model(model, crowd, g))
+                    mine = bundle(group_workspace(workspace, crowd, g))
                     end_hold(own, mine, h)
 
     return end_joints

@@ -8,6 +8,7 @@ fast and near take part in the search for the time.
 """
 
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.impulse.point_impulses import operands_of
 from physics.integrators.drift import make_drift
@@ -91,8 +92,8 @@ def make_choose_pairs(features):
     @sequence
     def choose_pairs(all_model, workspace, crowd, pairs, b, h, begins):
         kind, count = crowd.pair_kind[pairs.kind[b]], 0
-        model = model_of(all_model, kind)
-        mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
+        model = bundle(model_of(all_model, kind))
+        mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
         for i in range(LANES):
             if begins:
                 for k in range(mine.half_pair.shape[0]):
@@ -125,14 +126,14 @@ def make_time_pairs(features):
     @sequence
     def time_pairs(all_model, workspace, crowd, pairs, b, left, h):
         kind = crowd.pair_kind[pairs.kind[b]]
-        mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
+        mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
         chosen = 0
         for k in range(mine.half_pair.shape[0]):
             for i in range(LANES):
                 chosen += mine.timing[k].timed[i]
         if chosen == 0:
             return left, 0
-        model, earliest, touching = model_of(all_model, kind), left, 0
+        model, earliest, touching = bundle(model_of(all_model, kind)), left, 0
         for i in range(LANES):
             first, second = max(pairs.first[b, i], 0), max(pairs.second[b, i], 0)
             gather_solid(crowd, first, workspace.solid[0], i)
@@ -159,7 +160,8 @@ def make_expect_motion(features):
 
     @sequence
     def expect_motion(model, workspace, crowd, g, time, h):
-        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        own = bundle(group_model(model, crowd, g))
+        mine = bundle(group_workspace(workspace, crowd, g))
         far, left = 0, h - time
         for i in range(LANES):
             place(own, mine, i, 0.5 * time)  # in the middle of the rest
@@ -213,7 +215,8 @@ def make_follow(features):
 
     @sequence
     def begin(model, workspace, crowd, g, before, h):
-        own, mine = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+        own = bundle(group_model(model, crowd, g))
+        mine = bundle(group_workspace(workspace, crowd, g))
         kick(own, mine, before)
         forget_given(own, mine, h)
         for i in range(LANES):
@@ -225,7 +228,8 @@ def make_follow(features):
         mine = team.shared[team.thread]
         for n in range(MOST):
             for g in range(first, last):
-                own, near = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+                own = bundle(group_model(model, crowd, g))
+                near = bundle(group_workspace(workspace, crowd, g))
                 for i in range(LANES):
                     place(own, near, i, time - 0.5 * h)
                 for m in blocks_of(crowd, g):
@@ -246,7 +250,8 @@ def make_follow(features):
             ends = (not safe < left) or n == MOST - 1
             span = left if ends else safe
             for g in range(first, last):
-                own, near = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+                own = bundle(group_model(model, crowd, g))
+                near = bundle(group_workspace(workspace, crowd, g))
                 for i in range(LANES):
                     move(own, near, i, time, span, h)
             time += span
@@ -282,7 +287,8 @@ def make_follow(features):
                 mine[MEETING] += choose_pairs(model, workspace, crowd, pairs, b, h, impacts == 0.0)
         on_the_way = total(team, MEETING) > 0.0 or impacts > 0.0
         for g in range(first, last):
-            own, near = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+            own = bundle(group_model(model, crowd, g))
+            near = bundle(group_workspace(workspace, crowd, g))
             for i in range(LANES):
                 if on_the_way and impacts == 0.0:
                     keep_pose(own, near, BEGINNING, i)
@@ -291,7 +297,8 @@ def make_follow(features):
         if on_the_way and impacts < max(MOST_IMPACTS, crowd.place.shape[0]):
             time, meets = find(model, workspace, crowd, pairs, h, time, again, first, last, team)
         for g in range(first, last):
-            own, near = group_model(model, crowd, g), group_workspace(workspace, crowd, g)
+            own = bundle(group_model(model, crowd, g))
+            near = bundle(group_workspace(workspace, crowd, g))
             if meets:
                 for i in range(LANES):
                     shift_momenta(own, near, i, time - 0.5 * h)
@@ -349,7 +356,8 @@ def make_leave_impact(features):
         for n in range(crowd.order.shape[0]):
             b = crowd.order[n]
             if collided and takes_batch(n, team) and pairs.busy[b] != 0:
-                model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+                tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+                model, mine = bundle(tables), bundle(arrays)
                 first_touch = mine.half_pair[0].first_touch
                 for k in range(mine.half_pair.shape[0]):
                     points = operands_of(model, mine, k).points
@@ -361,7 +369,8 @@ def make_leave_impact(features):
                         if impulse > 0.0 and not first_touch[i] <= began + time:
                             first_touch[i] = began + time
         for g in range(first, last):
-            own, near = group_model(all_model, crowd, g), group_workspace(workspace, crowd, g)
+            own = bundle(group_model(all_model, crowd, g))
+            near = bundle(group_workspace(workspace, crowd, g))
             couple_fingers(own, near, h)
             for i in range(LANES):
                 shift_momenta(own, near, i, 0.5 * h - time)
@@ -378,5 +387,5 @@ def make_leave_impact(features):
 def count_batch_impulses(all_model, workspace, crowd, pairs, b, h):
     """Adds the collisions on the way to the mean normal forces of a batch."""
     kind = crowd.pair_kind[pairs.kind[b]]
-    mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
-    count_impulses(model_of(all_model, kind), mine, h)
+    mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
+    count_impulses(bundle(model_of(all_model, kind)), mine, h)

@@ -6,6 +6,7 @@ and at once. Statics don't change, and are shared by all.
 """
 
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, sequence, stage
 from physics.impulse.contact_rows import make_contact_rows
 from physics.impulse.point_impulses import operands_of
@@ -98,9 +99,9 @@ def make_list_contacts(features):
         if timed:  # what touches is kept where a manifold is chosen
             mark_phase(workspace.clock[0], meets)
         kind = crowd.pair_kind[pairs.kind[b]]
-        model = model_of(all_model, kind)
-        mine = workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0)
-        own = state_of(state, pairs, kind, b)
+        model = bundle(model_of(all_model, kind))
+        mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
+        own = bundle(state_of(state, pairs, kind, b))
         found = find_candidates(model, own, mine, crowd, pairs, b, starts_collision_step)
         if not found and pairs.busy[b] != 0:
             for i in range(LANES):
@@ -124,8 +125,9 @@ def make_prepare_batch(features):
 
     @sequence
     def prepare_batch(all_model, state, workspace, rows, crowd, pairs, b, h, remembers, meets):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        own = state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
+        own = bundle(state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b))
         mark_lanes(workspace.lane[0], pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], workspace.solid[0])
         gather_pose(crowd.frame, pairs.second[b], workspace.solid[1])
@@ -153,7 +155,8 @@ def make_find_batch_impacts(features):
 
     @sequence
     def find_batch_impacts(all_model, workspace, rows, crowd, pairs, b, h, extremes, lags):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         lane = workspace.lane[0]
         gather_speeds(crowd, pairs, b, workspace)
         for i in range(LANES):
@@ -203,7 +206,8 @@ def make_push_out_batch(features):
             some += lane.colliding[i]
         if some == 0:
             return 0
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -231,7 +235,8 @@ def make_impact_batch(features):
             some += lane.unconverged[i]
         if some == 0:
             return 0
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -264,7 +269,8 @@ def make_restitution_batch(features):
             some += pairs.colliding[b, i]
         if some == 0:
             return 0
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -291,7 +297,8 @@ def make_book_impacts(features):
 
     @sequence
     def book_impacts(all_model, workspace, rows, crowd, pairs, b, refresh):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         one, two = workspace.solid[0], workspace.solid[1]
         if timed and refresh:
             one, two = workspace.kept[GIVEN, 0], workspace.kept[GIVEN, 1]
@@ -319,7 +326,8 @@ def make_sweep_batch(features):
 
     @sequence
     def sweep_batch(all_model, workspace, rows, crowd, pairs, b, h, soft):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -339,7 +347,8 @@ def make_warm_batch(features):
 
     @sequence
     def warm_batch(all_model, workspace, rows, crowd, pairs, b):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
@@ -358,8 +367,9 @@ def make_finish_batch(features):
 
     @sequence
     def finish_batch(all_model, state, workspace, rows, crowd, pairs, b, h, elapsed, remembers):
-        model, mine = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        own = state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b)
+        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
+        model, mine = bundle(tables), bundle(arrays)
+        own = bundle(state_of(state, pairs, crowd.pair_kind[pairs.kind[b]], b))
         one, two, lane = workspace.solid[0], workspace.solid[1], workspace.lane[0]
         mark_lanes(lane, pairs.first[b], remembers)
         gather_pose(crowd.frame, pairs.first[b], one)

@@ -6,6 +6,7 @@ solved one after the other.
 
 from functools import cache
 
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry, stage
 from physics.manybody.blocks import (
@@ -85,6 +86,8 @@ def make_impulse_steps(features: Features):
         progress[2] is 2 where there are not enough rows, and progress[3] says how many it takes.
         """
         _ = sources
+        model, state, workspace = bundle(model), bundle(state), bundle(workspace)
+        crowd, pairs = bundle(crowd), bundle(pairs)
         team, batches = Team(barrier, shared, thread, threads), crowd.order.shape[0]
         first, last = share(0, crowd.group.shape[0], team)
         done, phase, stamp = progress[0], progress[1], progress[4]

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.impulse.contact_rows import make_contact_rows
@@ -80,14 +81,16 @@ def make_touching(features: Features) -> Any:
     def touching(all_model, state, workspace, crowd, pairs, arrays):
         """Rows beyond the length of `arrays.found` are counted only."""
         _ = sources
+        all_model, state, workspace = bundle(all_model), bundle(state), bundle(workspace)
+        crowd, pairs = bundle(crowd), bundle(pairs)
         count, room = 0, arrays.found.shape[0]
         for n in range(crowd.order.shape[0]):
             b = crowd.order[n]
             kind = crowd.pair_kind[pairs.kind[b]]
-            model = model_of(all_model, kind)
+            model = bundle(model_of(all_model, kind))
             points = arrays.points
-            mine = workspace_of(workspace, pairs, kind, b, points, 0, points.shape[0])
-            own = state_of(state, pairs, kind, b)
+            mine = bundle(workspace_of(workspace, pairs, kind, b, points, 0, points.shape[0]))
+            own = bundle(state_of(state, pairs, kind, b))
             if not has_candidates(mine):
                 continue
             mark_lanes(workspace.lane[0], pairs.first[b], False)

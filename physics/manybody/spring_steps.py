@@ -7,6 +7,7 @@ fixed order, so the result does not depend on the number of threads.
 
 from functools import cache
 
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry
 from physics.manybody.batches import make_batch_forces
@@ -51,6 +52,8 @@ def make_spring_steps(features: Features):
         and shared see `Team`.
         """
         _ = sources
+        model, state, workspace = bundle(model), bundle(state), bundle(workspace)
+        crowd, pairs = bundle(crowd), bundle(pairs)
         team, batches = Team(barrier, shared, thread, threads), crowd.order.shape[0]
         first, last = share(0, crowd.group.shape[0], team)
         done, phase = progress[0], progress[1]

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.integrators.runge_kutta import make_error, make_save_rates, make_speed, make_start
@@ -156,9 +157,10 @@ def make_kernel(features: Features):
         all_model, state, workspace, table, chosen, first, last, h, substeps, tolerance
     ):
         _ = sources
+        state, workspace = bundle(state), bundle(workspace)
         span = substeps * h
         for g in range(first, last):
-            model = constants(all_model, g)
+            model = bundle(constants(all_model, g))
             if load(model, state, workspace, chosen, g) == 0:
                 continue
             load_pace(state, workspace, g)

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, at, entry, stage
 from physics.model.features import GENERAL, NO_ROTATION, Features, cached_by_features
@@ -112,8 +113,9 @@ def make_readout(features: Features) -> Any:
     @entry
     def readout(model, state, table):
         _ = sources
+        state = bundle(state)
         for w in range(state.dynamic.shape[0]):
             g, lane = state.place[w] // LANES, state.place[w] % LANES
-            write_rows(constants(model, g), state, w, lane, table)
+            write_rows(bundle(constants(model, g)), state, w, lane, table)
 
     return readout

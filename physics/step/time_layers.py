@@ -9,6 +9,7 @@ import math
 from functools import cache
 
 from physics.collision.broadphase import make_clear_rest, make_forget
+from physics.compiler.bundles import bundle
 from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
@@ -91,8 +92,9 @@ def make_advance(features: Features):
         all_model, state, workspace, table, chosen, first, last, h, substeps, collision_substeps
     ):
         _ = sources
+        state, workspace = bundle(state), bundle(workspace)
         for g in range(first, last):
-            model = constants(all_model, g)
+            model = bundle(constants(all_model, g))
             if load(model, state, workspace, chosen, g) == 0:
                 continue
             load_servos(model, state, workspace)
