@@ -1,7 +1,7 @@
 """Runs all benchmarks, or those named: python -m benchmarks [--save] [name ...].
 
-python -m benchmarks trade [trial ...] measures the trade of speed for accuracy, which takes an
-hour.
+python -m benchmarks trade [trial ...] measures the trade of speed for accuracy, which takes
+hours.
 """
 
 import argparse

@@ -60,25 +60,27 @@ def finished_at(task: str, first: str, last: str) -> TrainConfig:
     return config.replace(finetune_timesteps=steps, finetune_env_kwargs={"fidelity": last})
 
 
-def run_of(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
-    """A finished run in a folder, and its wall time in s; it is trained or resumed if needed."""
+def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
+    """A finished run in a folder, and its wall time in s; it is trained or resumed if needed.
+
+    The wall time is kept beside the run once it has finished.
+
+    Raises:
+        KeyboardInterrupt: the training was interrupted.
+    """
     runs = sorted(folder.rglob("config.yaml"))
     if not runs:
         result = train(config, folder, quiet=True)
-        return result.folder, result.seconds
-    run = RunFolder(runs[0].parent)
-    summary = run.path / "seconds.txt"
-    if summary.exists():
-        return run, float(summary.read_text())
-    result = resume(run, quiet=True)
+    else:
+        run = RunFolder(runs[0].parent)
+        summary = run.path / "seconds.txt"
+        if summary.exists():
+            return run, float(summary.read_text())
+        result = resume(run, quiet=True)
+    if result.interrupted:
+        raise KeyboardInterrupt
+    (result.folder.path / "seconds.txt").write_text(f"{result.seconds:.1f}")
     return result.folder, result.seconds
-
-
-def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
-    """As `run_of`; keeps the wall time beside the run."""
-    run, seconds = run_of(config, folder)
-    (run.path / "seconds.txt").write_text(f"{seconds:.1f}")
-    return run, seconds
 
 
 def success(policy: Policy, preset: str, episodes: int = EPISODES) -> float:

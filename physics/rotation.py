@@ -39,7 +39,7 @@ SMALL_ROTATION = 0.3
 
 
 @stage
-def _composed(x, y, z, w, px, py, pz, c):
+def compose(x, y, z, w, px, py, pz, c):
     """The product (p, c) (x) (x, y, z, w); one Newton step brings its length back to 1."""
     nx = c * x + w * px + (py * z - pz * y)
     ny = c * y + w * py + (pz * x - px * z)
@@ -61,7 +61,7 @@ def rotate_quaternion(x, y, z, w, ax, ay, az):
     c = 1.0 - s2 * (1 / 2) * (
         1.0 - s2 * (1 / 12) * (1.0 - s2 * (1 / 30) * (1.0 - s2 * (1 / 56) * (1.0 - s2 * (1 / 90))))
     )
-    return _composed(x, y, z, w, k * ax, k * ay, k * az, c)
+    return compose(x, y, z, w, k * ax, k * ay, k * az, c)
 
 
 @stage
@@ -69,7 +69,7 @@ def rotate_quaternion_far(x, y, z, w, ax, ay, az):
     """As `rotate_quaternion`, by an angle of any size above zero."""
     s = 0.5 * math.sqrt(ax * ax + ay * ay + az * az)
     k = 0.5 * math.sin(s) / s
-    return _composed(x, y, z, w, k * ax, k * ay, k * az, math.cos(s))
+    return compose(x, y, z, w, k * ax, k * ay, k * az, math.cos(s))
 
 
 def rotation_matrix(quaternion: Array) -> Array:

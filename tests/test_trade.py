@@ -73,7 +73,7 @@ def test_rows_survive_the_file(tmp_path):
     assert found[1].note == rows[1].note
     assert math.isnan(found[1].error)
     (tmp_path / "u.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(ValueError, match="columns"):
+    with pytest.raises(ValueError, match="must begin with"):
         store.load(tmp_path / "u.csv")
 
 

@@ -12,7 +12,7 @@ sample of the chunks, the first 96 worlds must be bitwise equal to 96 worlds tha
 advances by themselves. Failures are counted, and the first ones are saved in .failures/.
 
 python -m benchmarks.adversarial [--steps 1e9] [--tasks push ...] [--presets fast ...]
-    [--actions ramming ...] [--parameters scene ...] [--resume CSV]
+    [--actions ramming ...] [--parameters scene ...] [--resume CSV] [--write]
 python -m benchmarks.adversarial --replay FILE
 """
 
@@ -24,8 +24,9 @@ from benchmarks.adversarial.actions import ACTIONS
 from benchmarks.adversarial.chunk import KINDS, Combination, run_chunk
 from benchmarks.adversarial.measured_runner import PARAMETERS
 from benchmarks.adversarial.replay import replay
-from benchmarks.adversarial.report import Results, append, load, table
+from benchmarks.adversarial.report import Results, append, load, summary, table
 from benchmarks.report.provenance import describe, provenance
+from benchmarks.report.results_file import save
 from benchmarks.report.tables import plain
 from rigid_envs.tasks import TASKS
 
@@ -55,10 +56,15 @@ def chunks_of(combinations: list[Combination], steps: float) -> list[tuple[Combi
 
 
 def run(combinations: list[Combination], steps: float, path: Path | None) -> Results:
-    """Runs all chunks that a resumed file doesn't hold."""
+    """Runs all chunks that a resumed file doesn't hold, or holds with fewer steps."""
     results = load(path) if path else {}
     chunks = chunks_of(combinations, steps)
-    left = [chunk for chunk in chunks if chunk[:2] not in results]
+    left = [
+        (combination, number, count)
+        for combination, number, count in chunks
+        if (combination, number) not in results
+        or results[combination, number].steps < count * WORLDS
+    ]
     todo, done, start = sum(count for _, _, count in left), 0, perf_counter()
     for combination, number, count in left:
         figures = run_chunk(combination, number, WORLDS, count, number % COMPARED == 0)
@@ -93,12 +99,14 @@ def main() -> None:
     ):
         parser.add_argument(f"--{name}", nargs="+", choices=values, default=values)
     parser.add_argument("--resume", type=Path, metavar="CSV", help="chunks are appended to it")
+    parser.add_argument("--write", action="store_true", help="keep the summary for the docs")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="of a saved failure")
     options = parser.parse_args()
     if options.replay:
         replay(options.replay)
         return
-    print(describe(provenance()))
+    this_run = provenance()
+    print(describe(this_run))
     combinations = [
         Combination(task, preset, actions, parameters)
         for task in options.tasks
@@ -108,6 +116,8 @@ def main() -> None:
     ]
     results = run(combinations, options.steps, options.resume)
     print(plain(table(results)))
+    if options.write:
+        save([summary(results)], this_run, keep=True)
 
 
 if __name__ == "__main__":

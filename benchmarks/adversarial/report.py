@@ -1,10 +1,10 @@
 """Results of chunks in a CSV file, and the table of all combinations."""
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.adversarial.chunk import Combination, Figures
+from benchmarks.report.csv_file import append_rows, read_rows
 from benchmarks.report.tables import Cell, Table
 
 Key = tuple[Combination, int]
@@ -16,16 +16,16 @@ COLUMNS = [
     "sank", "escaped", "gained energy", "not bitwise", "lowest centre m", "deepest penetration m",
     "fastest m/s", "largest gain mJ", "gain over allowed", "s",
 ]  # fmt: skip
+SUMMARY_COLUMNS = [
+    "task", "preset", "parameters", "million steps", "million episodes", "not finite",
+    "not bitwise", "sank", "escaped", "gained energy", "deepest penetration mm",
+    "largest gain mJ",
+]  # fmt: skip
 
 
 def append(path: Path, combination: Combination, number: int, figures: Figures) -> None:
     """Adds a chunk to a file, which is created if it isn't there."""
-    new = not path.exists()
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(HEADER)
-        writer.writerow([*combination, number, *figures])
+    append_rows(path, HEADER, [[*combination, number, *figures]])
 
 
 def load(path: Path) -> Results:
@@ -34,17 +34,11 @@ def load(path: Path) -> Results:
     Raises:
         ValueError: not such a file.
     """
-    if not path.exists():
-        return {}
     results: Results = {}
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = csv.reader(file)
-        if next(rows, None) != HEADER:
-            raise ValueError(f"{path} must begin with the line {','.join(HEADER)}")
-        for row in rows:
-            names = Combination(*row[: len(Combination._fields)])
-            number, *figures = row[len(Combination._fields) :]
-            results[names, int(number)] = Figures(*map(float, figures))
+    for row in read_rows(path, HEADER):
+        names = Combination(*row[: len(Combination._fields)])
+        number, *figures = row[len(Combination._fields) :]
+        results[names, int(number)] = Figures(*map(float, figures))
     return results
 
 
@@ -70,6 +64,24 @@ def table(results: Results) -> Table:
     if results:
         rows.append(["all", "", "", "", *_cells(total(results.values()))])
     return Table("adversarial", "Hostile actions, resets and parameters", COLUMNS, rows)
+
+
+def summary(results: Results) -> Table:
+    """One row per task, preset and kind of parameters, and the total."""
+    rows: list[list[Cell]] = []
+    groups = dict.fromkeys((c.task, c.preset, c.parameters) for c, _ in results)
+    for names in groups:
+        own = (f for (c, _), f in results.items() if (c.task, c.preset, c.parameters) == names)
+        rows.append([*names, *_brief(total(own))])
+    rows.append(["all", "", "", *_brief(total(results.values()))])
+    return Table("adversarial", "Hostile actions, resets and parameters", SUMMARY_COLUMNS, rows)
+
+
+def _brief(figures: Figures) -> list[Cell]:
+    return [
+        figures.steps / 1e6, figures.episodes / 1e6, figures.not_finite, figures.different,
+        figures.sank, figures.escaped, figures.gained, 1e3 * figures.deepest, 1e3 * figures.gain,
+    ]  # fmt: skip
 
 
 def _cells(figures: Figures) -> list[Cell]:

@@ -7,11 +7,10 @@ families, each with kernels of its own. A scene that runs does so for 50 substep
 come as SimulationDiverged with a reason. Constructors are then called with garbage. What is not as
 it must be is a finding, and saved as a script in .failures/; so are divergences.
 
-python -m benchmarks.fuzz [--scenes 1e5] [--families "one box" ...] [--resume CSV]
+python -m benchmarks.fuzz [--scenes 1e5] [--families "one box" ...] [--resume CSV] [--write]
 """
 
 import argparse
-import csv
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
@@ -19,7 +18,9 @@ from time import perf_counter
 from benchmarks.fuzz.arguments import findings
 from benchmarks.fuzz.families import FAMILIES, Family
 from benchmarks.fuzz.outcomes import DIVERGED, FINDING, RAN, REFUSED, Outcome, outcome_of, save
+from benchmarks.report.csv_file import append_rows, read_rows
 from benchmarks.report.provenance import ROOT, describe, provenance
+from benchmarks.report.results_file import save as save_tables
 from benchmarks.report.tables import Cell, Table, plain
 
 KINDS = (REFUSED, RAN, DIVERGED, FINDING)
@@ -44,42 +45,32 @@ def run_family(family: Family, first: int, count: int) -> list[float]:
     return [*(float(kinds[kind]) for kind in KINDS), float(len(kernels)), perf_counter() - start]
 
 
-def load(path: Path | None) -> Counts:
-    """The lines of a resumed file."""
-    if not path or not path.exists():
-        return {}
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    if not rows or rows[0] != HEADER:
-        raise ValueError(f"{path} must begin with the line {','.join(HEADER)}")
-    return {(row[0], int(row[1])): list(map(float, row[2:])) for row in rows[1:]}
-
-
 def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
-    """Runs all chunks that a resumed file doesn't hold."""
-    results = load(path)
+    """Runs all chunks that a resumed file doesn't hold, or holds with fewer scenes."""
+    results: Counts = {}
+    for row in read_rows(path, HEADER) if path else ():
+        results[row[0], int(row[1])] = list(map(float, row[2:]))
     each = max(1, round(scenes / len(families)))
     chunks = [
         (family, first, min(CHUNK, each - first))
         for first in range(0, each, CHUNK)
         for family in families
     ]
-    left = [chunk for chunk in chunks if (chunk[0].name, chunk[1]) not in results]
+    left = [
+        (family, first, count)
+        for family, first, count in chunks
+        if sum(results.get((family.name, first), [])[: len(KINDS)]) < count
+    ]
     start = perf_counter()
     for done, (family, first, count) in enumerate(left):
-        row = run_family(family, first, count)
-        results[family.name, first] = row
+        found = run_family(family, first, count)
+        results[family.name, first] = found
         if path:
-            new = not path.exists()
-            with path.open("a", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                if new:
-                    writer.writerow(HEADER)
-                writer.writerow([family.name, first, *row])
+            append_rows(path, HEADER, [[family.name, first, *found]])
         spent = perf_counter() - start
-        counted = ", ".join(f"{n:.0f} {kind}" for n, kind in zip(row, KINDS, strict=False))
+        counted = ", ".join(f"{n:.0f} {kind}" for n, kind in zip(found, KINDS, strict=False))
         print(
-            f"{family.name}: {counted} in {row[-1]:.0f} s; "
+            f"{family.name}: {counted} in {found[-1]:.0f} s; "
             f"{spent / (done + 1) * (len(left) - done - 1) / 60:.0f} min left",
             flush=True,
         )
@@ -109,13 +100,18 @@ def main() -> None:
     parser.add_argument("--scenes", type=float, default=1e4, help="of all families together")
     parser.add_argument("--families", nargs="+", choices=names, default=names, metavar="FAMILY")
     parser.add_argument("--resume", type=Path, metavar="CSV", help="chunks are appended to it")
+    parser.add_argument("--write", action="store_true", help="keep the table for the docs")
     options = parser.parse_args()
-    print(describe(provenance()))
+    this_run = provenance()
+    print(describe(this_run))
     chosen = [family for family in FAMILIES if family.name in options.families]
-    print(plain(table(run(chosen, options.scenes, options.resume))))
+    outcomes = table(run(chosen, options.scenes, options.resume))
+    print(plain(outcomes))
     calls, wrong = findings()
     print(f"\n{calls} constructors with garbage: {len(wrong)} findings")
     print("\n".join(wrong))
+    if options.write:
+        save_tables([outcomes], this_run, keep=True)
 
 
 if __name__ == "__main__":

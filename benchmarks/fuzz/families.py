@@ -36,6 +36,7 @@ class Family(NamedTuple):
 
 
 IMPULSE = {"law": "impulse"}
+NEWTON = {"law": "impulse", "solver": "newton"}
 
 FAMILIES: tuple[Family, ...] = (
     Family("one ball", ("ball",)),
@@ -47,6 +48,8 @@ FAMILIES: tuple[Family, ...] = (
     Family("boxes, tilted", ("box", "box"), statics=("ground", "box"), tilted=True),
     Family("boxes", ("box", "box", "box")),
     Family("boxes, impulses", ("box", "box", "box"), fidelity=IMPULSE),
+    Family("boxes, Newton", ("box", "box", "ball"), fidelity=NEWTON),
+    Family("boxes, swept, Newton", ("box", "box"), fidelity={"time_control": "swept", **NEWTON}),
     Family("boxes, dashpot", ("box", "box"), fidelity={"damping": "dashpot"}),
     Family("boxes, viscous", ("box", "box"), fidelity={"friction": "viscous"}),
     Family("boxes, euler", ("box", "box"), fidelity={"integrator": "euler"}),

@@ -10,13 +10,14 @@ saved elsewhere.
 """
 
 import argparse
-import csv
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.report.csv_file import append_rows, read_rows
 from benchmarks.report.provenance import ROOT, describe, provenance
 from benchmarks.report.results_file import save
 from benchmarks.stability.maps import MAPS, Map, at
@@ -56,8 +57,10 @@ def outcome(scene: Scene, chosen: Map, value: float, fidelity: Fidelity) -> str:
     try:
         world = World(scene, fidelity, threads=1, allow_unstable=True)
         start = _energy(world)
-        for _ in range(round(chosen.time / 0.1)):
-            world.advance(0.1)
+        # whole substeps, for a time that they don't divide would shorten them
+        piece = math.ceil(0.1 / fidelity.substep) * fidelity.substep
+        for _ in range(math.ceil(chosen.time / piece)):
+            world.advance(piece)
             if not _energy(world) < GROWN * start + 1e-3 * _scale(scene):
                 return DIVERGED
     except SimulationDiverged:
@@ -101,25 +104,10 @@ def measured(setting: str, chosen: Map) -> Iterator[Cell]:
 
 def load(path: Path = PATH) -> list[Cell]:
     """The cells of a file; none if it doesn't exist."""
-    if not path.exists():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        return [
-            Cell(row["setting"], row["map"], float(row["value"]), float(row["substep"]),
-                 row["outcome"], int(row["refused"]), float(row["limit"]))
-            for row in csv.DictReader(file)
-        ]  # fmt: skip
-
-
-def append(cells: list[Cell], path: Path = PATH) -> None:
-    """Adds cells at the end of a file."""
-    new = not path.exists()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        if new:
-            writer.writerow(Cell._fields)
-        writer.writerows(cells)
+    return [
+        Cell(setting, name, float(value), float(substep), found, int(no), float(limit))
+        for setting, name, value, substep, found, no, limit in read_rows(path, Cell._fields)
+    ]
 
 
 def main() -> None:
@@ -141,7 +129,7 @@ def main() -> None:
             if (setting, chosen.name) in done:
                 continue
             cells = list(measured(setting, chosen))
-            append(cells, options.data)
+            append_rows(options.data, Cell._fields, cells)
             counts = {o: sum(c.outcome == o for c in cells) for o in (STABLE, DRIFTED, DIVERGED)}
             print(setting, chosen.name, counts, flush=True)
     for path in stability.draw_all(load(options.data), options.data.parent):

@@ -1,6 +1,5 @@
 """docs/trade/trade.csv: one row per trial and setting. A run that was interrupted resumes there."""
 
-import csv
 import hashlib
 import math
 from collections import Counter
@@ -8,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.report.csv_file import append_rows, read_rows
 from benchmarks.report.provenance import ROOT
 
 PATH = ROOT / "docs" / "trade" / "trade.csv"
@@ -59,31 +59,18 @@ def load(path: Path = PATH) -> list[Row]:
     Raises:
         ValueError: the file has other columns.
     """
-    if not path.exists():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != Row._fields:
-            raise ValueError(f"{path.name} has the columns {reader.fieldnames}, not {Row._fields}")
-        rows = []
-        for found in reader:
-            values: dict[str, str | float] = dict(found)
-            for name in _NUMBERS:
-                values[name] = float(found[name]) if found[name] else math.nan
-            rows.append(Row(**values))  # type: ignore[arg-type]
+    rows = []
+    for found in read_rows(path, Row._fields):
+        values: dict[str, str | float] = dict(zip(Row._fields, found, strict=True))
+        for name in _NUMBERS:
+            values[name] = float(values[name]) if values[name] else math.nan
+        rows.append(Row(**values))  # type: ignore[arg-type]
     return rows
 
 
 def append(rows: Iterable[Row], path: Path = PATH) -> None:
     """Adds rows at the end of a file, which is created if it doesn't exist."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = not path.exists()
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        if new:
-            writer.writerow(Row._fields)
-        for row in rows:
-            writer.writerow(_cell(value) for value in row)
+    append_rows(path, Row._fields, ([_cell(value) for value in row] for row in rows))
 
 
 def replace_all(rows: Iterable[Row], path: Path = PATH) -> None:

@@ -4,19 +4,10 @@ import math
 
 from physics.compiler.jit import LANES, at, stage
 from physics.integrators.euler import make_euler_rotation
+from physics.integrators.far_rotation import make_far_rotation, small_rotation_limit
 from physics.integrators.midpoint import make_midpoint_rotation
-from physics.model.features import EULER, GENERAL, NO_ROTATION, cached_by_features
-from physics.rotation import SMALL_ROTATION, rotate_quaternion, rotate_quaternion_far
-
-# largest number of parts of a rotation; beyond 30 rad per substep they exceed SMALL_ROTATION
-MOST_PARTS = 100.0
-
-
-@stage
-def small_rotation_limit(jx, jy, jz, time):
-    """Square of the angular momentum up to which a rotation counts as small."""
-    most = time * max(jx, jy, jz)
-    return SMALL_ROTATION * SMALL_ROTATION / (most * most)
+from physics.model.features import EULER, NO_ROTATION, cached_by_features
+from physics.rotation import rotate_quaternion
 
 
 @cached_by_features
@@ -28,10 +19,9 @@ def make_drift(features):
     """
     rotation = features.rotation
     euler = features.integrator == EULER
-    in_parts = rotation == GENERAL and not euler
     make_rotation = make_euler_rotation if euler else make_midpoint_rotation
     rotated = make_rotation(features, rotate_quaternion)
-    rotated_far = make_rotation(features, rotate_quaternion_far)
+    far_rotation = make_far_rotation(features)
 
     @stage
     def drift(model, workspace, time):
@@ -65,35 +55,21 @@ def make_drift(features):
                 q[2, i] = nz if small else z
                 q[3, i] = nw if small else w
                 # the sum of absolute values is an upper bound of the length, and needs no root; inf
-                # marks lanes for the second loop, which makes large rotations in parts
+                # marks lanes for the second loop, which makes large rotations
                 rotation_bound[i] = span * (abs(ox) + abs(oy) + abs(oz)) if small else math.inf
                 far += 0 if small else 1
             if far > 0:
                 for i in range(LANES):
-                    jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-                    square, span = (
-                        small_rotation_limit(jx, jy, jz, time),
-                        time * at(reaches, i),
-                    )
-                    lx, ly, lz = L[0, i], L[1, i], L[2, i]
                     if rotation_bound[i] == math.inf:
-                        far_by = math.sqrt((lx * lx + ly * ly + lz * lz) / square)
-                        parts = 1
-                        # equal moments need one part; so does NaN, which ceil could not convert
-                        if in_parts and far_by > 1.0 and not jx == jy == jz:
-                            parts = math.ceil(min(MOST_PARTS, far_by))
-                        x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
-                        fastest = 0.0
-                        for _ in range(parts):
-                            x, y, z, w, ox, oy, oz = rotated_far(
-                                x, y, z, w, jx, jy, jz, lx, ly, lz, time / parts
-                            )
-                            speed = abs(ox) + abs(oy) + abs(oz)
-                            fastest = fastest if speed <= fastest else speed  # keeps NaN
+                        x, y, z, w, fastest = far_rotation(
+                            q[0, i], q[1, i], q[2, i], q[3, i],
+                            at(j[0], i), at(j[1], i), at(j[2], i),
+                            L[0, i], L[1, i], L[2, i], time,
+                        )  # fmt: skip
                         q[0, i] = x
                         q[1, i] = y
                         q[2, i] = z
                         q[3, i] = w
-                        rotation_bound[i] = span * fastest
+                        rotation_bound[i] = time * at(reaches, i) * fastest
 
     return drift

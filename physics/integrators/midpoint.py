@@ -13,8 +13,8 @@ of 1 ms, +1.99e-6 and -1.99e-6 after 10^6 steps. So their mean is used. The ener
 2e-10 for 10^7 steps; with the implicit rule it swings by 1.7e-7 (docs/decisions).
 
 The midpoint rule does not conserve energy where L would rotate the body by a large angle about its
-slimmest axis. Such a rotation is made in up to MOST_PARTS parts of at most SMALL_ROTATION,
-0.3 rad, which suffices for 30 rad per substep (see drift.py; evidence: docs/decisions).
+slimmest axis. Such a rotation is exact for bodies with two equal moments, and made in parts for
+others (see far_rotation.py; evidence: docs/decisions).
 """
 
 from physics.compiler.jit import stage

@@ -1,5 +1,6 @@
 """Checks before the first step that the substep is short enough for a world of many bodies."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, cast
 
@@ -44,6 +45,19 @@ def check_crowd(
     Raises:
         ValueError: see `analysis.step_limits.check_step`.
     """
+    solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
+    stiff = any(solid.material.stiffness is not None for solid in solids)
+    for few in neighbourhoods(scene, of_solid, stiff):
+        check_step(few, fidelity, *build(few, fidelity, own_spacing=True))
+    for fields, mechanism in mechanisms if scene.fields or scene.drives else ():
+        _check_mechanism(scene, fidelity, fields, mechanism)
+
+
+def neighbourhoods(scene: Scene, of_solid: Array, crowded: bool) -> Iterator[Scene]:
+    """Each kind of body on the statics; if `crowded` also between six of each that it can touch.
+
+    Of many kinds only the lightest and the heaviest. `of_solid`: see `check_crowd`.
+    """
     dynamic: list[Body | Drive] = [*scene.bodies, *scene.driven_bodies]
     found, first = np.unique(of_solid[: len(dynamic)], return_index=True)
     by_mass = sorted(first.tolist(), key=lambda n: cast(float, dynamic[n].mass))
@@ -51,17 +65,13 @@ def check_crowd(
         by_mass = [*by_mass[:_MOST], *by_mass[-_MOST:]]
     known = {int(kind): n for n, kind in enumerate(of_solid[len(dynamic) :])}
     statics = [scene.statics[n] for n in sorted(known.values())]
-    solids = (*dynamic, *scene.statics)
-    stiff = any(solid.material.stiffness is not None for solid in solids)
     for n in by_mass:
         own = _named(dynamic[n], scene.solid_names[n])
-        _check([own], statics, scene, fidelity)
-        for m in by_mass if stiff else ():
+        yield _scene_of([own], statics, scene)
+        for m in by_mass if crowded else ():
             if touch_each_other(own, dynamic[m]):
                 around = _named(dynamic[m], None)
-                _check([own, *([around] * _NEIGHBOURS)], statics, scene, fidelity)
-    for fields, mechanism in mechanisms if scene.fields or scene.drives else ():
-        _check_mechanism(scene, fidelity, fields, mechanism)
+                yield _scene_of([own, *([around] * _NEIGHBOURS)], statics, scene)
 
 
 def check_impacts(scene: Scene, fidelity: Fidelity, kinds: Kinds) -> None:
@@ -102,10 +112,7 @@ def _named(solid: Body | Drive, name: str | None) -> Body | Drive:
     return replace(solid, name=name)
 
 
-def _check(
-    dynamic: list[Body | Drive], statics: list[Any], scene: Scene, fidelity: Fidelity
-) -> None:
+def _scene_of(dynamic: list[Body | Drive], statics: list[Any], scene: Scene) -> Scene:
     bodies = [solid for solid in dynamic if isinstance(solid, Body)]
     drives = [solid for solid in dynamic if isinstance(solid, Drive)]
-    few = Scene(bodies=bodies, drives=drives, statics=statics, gravity=scene.gravity)
-    check_step(few, fidelity, *build(few, fidelity, own_spacing=True))
+    return Scene(bodies=bodies, drives=drives, statics=statics, gravity=scene.gravity)

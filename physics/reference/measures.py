@@ -67,9 +67,9 @@ def slide(half_extents: tuple[float, float, float], speed: float, make: Make) ->
     return abs(distance / closed_forms.slide_distance(speed, FRICTION, GRAVITY) - 1.0)
 
 
-def creep(make: Make) -> float:
-    """Mean speed in m/s at which a cube creeps down a slope of 20 degrees, from 1 s to 60 s."""
-    world = make(block_on_ground(BLOCK, FRICTION, angle=math.radians(20.0), mass=1.0))
+def creep(half_extents: tuple[float, float, float], make: Make) -> float:
+    """Mean speed in m/s at which a block creeps down a slope of 20 degrees, from 1 s to 60 s."""
+    world = make(block_on_ground(half_extents, FRICTION, angle=math.radians(20.0), mass=1.0))
     world.advance(1.0)
     start = world.position[0, 0].copy()
     world.advance(59.0)

@@ -7,15 +7,13 @@ middle: exact for the centres, the midpoint rule for rotations. The whole subste
 drift of `integrators/drift.py`.
 """
 
-import math
-
 from physics.compiler.jit import at, stage
-from physics.integrators.drift import MOST_PARTS, small_rotation_limit
+from physics.integrators.far_rotation import make_far_rotation, small_rotation_limit
 from physics.integrators.midpoint import make_midpoint_rotation
-from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
+from physics.model.features import NO_ROTATION, cached_by_features
 from physics.motion.kinematics import make_angular_velocity, write_rotation
 from physics.motion.vectors import rotated
-from physics.rotation import rotate_quaternion, rotate_quaternion_far
+from physics.rotation import rotate_quaternion
 from physics.scene.shapes import PLANE
 
 
@@ -24,7 +22,7 @@ def make_move(features):
     """Stage that moves lane i by `span` s from `time` s after the beginning of the substep `h`."""
     rotation = features.rotation
     midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
-    midpoint_rotation_far = make_midpoint_rotation(features, rotate_quaternion_far)
+    far_rotation = make_far_rotation(features)
 
     @stage
     def move(model, workspace, i, time, span, h):
@@ -54,15 +52,7 @@ def make_move(features):
                 x, y, z, w, ox, oy, oz = midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
                 fastest = abs(ox) + abs(oy) + abs(oz)
             else:
-                parts, far_by, fastest = 1, math.sqrt(square / limit), 0.0
-                if rotation == GENERAL and far_by > 1.0 and not jx == jy == jz:
-                    parts = math.ceil(min(MOST_PARTS, far_by))
-                for _ in range(parts):
-                    x, y, z, w, ox, oy, oz = midpoint_rotation_far(
-                        x, y, z, w, jx, jy, jz, lx, ly, lz, span / parts
-                    )
-                    speed = abs(ox) + abs(oy) + abs(oz)
-                    fastest = fastest if speed <= fastest else speed  # keeps NaN
+                x, y, z, w, fastest = far_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
             q[0, i] = x
             q[1, i] = y
             q[2, i] = z

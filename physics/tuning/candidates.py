@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.fidelity import FIND_IMPACTS, PRESETS, Fidelity
 from physics.scene.scene import Scene
-from physics.scene.solids import touch_each_other
+from physics.scene.solids import Ground, touch_each_other
 from physics.tuning.motion import FRAME
 
 # substeps per frame of 40 ms: 1, then two or three values per octave up to 62.5 us
@@ -37,6 +37,19 @@ def can_touch(scene: Scene) -> bool:
         for i, a in enumerate(moving)
         for b in solids[i + 1 :]
     )  # fmt: skip
+
+
+def safe_speed(scene: Scene, fidelity: Fidelity) -> tuple[float, float]:
+    """m/s above which a body may pass through a solid in a substep, and the thinnest width in m.
+
+    Half a width per substep: the next sample lies where the surface pushes back to the side that
+    the body came from. Infinite where nothing can touch or impacts are found within a step.
+    """
+    if fidelity.time_control in FIND_IMPACTS or not can_touch(scene):
+        return math.inf, math.inf
+    solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
+    thin = min(solid.shape.width for solid in solids if not isinstance(solid, Ground))
+    return 0.5 * thin / fidelity.substep, thin
 
 
 def with_substep(fidelity: Fidelity, substep: float) -> Fidelity:

@@ -14,6 +14,5 @@ def code(fidelity: Fidelity) -> str:
         f"{field.name}={getattr(fidelity, field.name)!r}"
         for field in fields(fidelity)
         if getattr(fidelity, field.name) != field.default
-        and not (field.name == "tolerance" and fidelity.integrator != "adaptive")
     ]
     return f"Fidelity({', '.join(changed)})"

@@ -1,29 +1,30 @@
 """explain: what a fidelity models of a scene and what it leaves out, its limits and its cost."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from physics.analysis import stability
 from physics.analysis.field_limits import longest_step
-from physics.analysis.integrator_limits import check_integrator
-from physics.analysis.solver_limits import check_solver
-from physics.analysis.step_limits import check_step
-from physics.manybody.simulation import is_crowd
+from physics.analysis.step_limits import largest_safe_step
+from physics.manybody.limits import neighbourhoods
 from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features
 from physics.model.tables import Model
 from physics.scene.drives import Drive
-from physics.scene.fidelity import FIND_IMPACTS, Fidelity
+from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground
-from physics.tuning.candidates import can_touch
+from physics.tuning.candidates import can_touch, safe_speed
 from physics.tuning.description import code
 from physics.tuning.motion import side_by_side
 from physics.tuning.parts_cost import parts_cost
+from physics.world import World
+
+Array = np.ndarray
 
 _KINDS = 6  # different bodies that are listed
 _PAIRS = 12  # different contacts that are listed
@@ -55,10 +56,13 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     lines += [f"  {line}" for line in _left_out(scene, fidelity, features)]
     lines += ["", "Steps"]
     lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
+    refused = _refusal(scene, fidelity)
+    if refused:
+        lines.append(f"  a World refuses it: {refused}")
     if len(model.half_pair):
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
-    if costs:
+    if costs and not refused:
         worlds = side_by_side(scene)
         which = "world" if worlds == 1 else "of many worlds"
         lines += ["", f"Cost per substep of one {which}, one thread"]
@@ -70,14 +74,25 @@ def _kinds(scene: Scene) -> Scene:
     """A scene with at most two of each kind of body, without joints and fields on others."""
     if len(scene.bodies) <= 2 * _KINDS:
         return scene
-    known: dict[tuple[Any, ...], int] = {}
+    met: Counter[int] = Counter()
     bodies = []
-    for body in scene.bodies:
-        key = body.shape, body.mass, body.material, body.group, body.mask
-        known[key] = known.get(key, 0) + 1
-        if known[key] <= 2 and len(known) <= _KINDS:
+    for body, kind in zip(scene.bodies, _kinds_of(scene), strict=False):
+        met[kind] += 1
+        if met[kind] <= 2 and kind < _KINDS:
             bodies.append(body)
     return replace(scene, bodies=bodies, fields=(), joints=())
+
+
+def _kinds_of(scene: Scene) -> Array:
+    """[solids] kind of each, numbered as they come; alike are shape, mass, material and masks."""
+    known: dict[tuple[Any, ...], int] = {}
+    kinds = []
+    for solid in (*scene.bodies, *scene.driven_bodies, *scene.statics):
+        form = (solid.height,) if isinstance(solid, Ground) else (solid.shape,)
+        mass = getattr(solid, "mass", None)
+        key = type(solid), *form, mass, solid.material, solid.group, solid.mask
+        kinds.append(known.setdefault(key, len(known)))
+    return np.array(kinds)
 
 
 def _modelled(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[str]:
@@ -136,18 +151,12 @@ def _left_out(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[
         solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
         if any(solid.material.stiffness is not None for solid in solids):
             yield "elastic deformation: impulses use Material.stiffness only for soft contacts"
-    if touching and fidelity.time_control not in FIND_IMPACTS:
-        thin = min(
-            solid.shape.width
-            for solid in (*scene.bodies, *scene.driven_bodies, *scene.statics)
-            if not isinstance(solid, Ground)
+    speed, thin = safe_speed(scene, fidelity)
+    if fidelity.time_control == "fixed" and math.isfinite(speed):
+        yield (
+            f"impacts within a step: what is faster than {speed:.3g} m/s can pass through the "
+            f"thinnest solid, {1e3 * thin:.3g} mm; time_control='swept' prevents it"
         )
-        speed = 0.5 * thin / fidelity.substep
-        if fidelity.time_control == "fixed":
-            yield (
-                f"impacts within a step: what is faster than {speed:.3g} m/s can pass through the "
-                f"thinnest solid, {1e3 * thin:.3g} mm; time_control='swept' prevents it"
-            )
     if touching and fidelity.geometry == "shape":
         yield f"sharp edges: boxes are rounded by {100 * fidelity.rounding:.3g} % of a half width"
     if not scene.drives and not scene.joints and not scene.fields:
@@ -161,9 +170,8 @@ def _steps(
         yield f"chosen by the integrator, for an error of {fidelity.tolerance:g} per second"
         return
     step = fidelity.substep
-    longest, limiting = stability.of_scene(few, model, features, fidelity.spacing)
+    longest, name = _largest_step(scene, few, fidelity)
     by_fields = longest_step(few, model, fidelity.integrator)[0] if few.fields else math.inf
-    name = few.solid_names[limiting]
     if by_fields < longest:
         longest, name = by_fields, "a field"
     yield f"substep {1e3 * step:.4g} ms"
@@ -178,12 +186,22 @@ def _steps(
         solids = (*few.bodies, *few.driven_bodies, *few.statics)
         if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
             yield "shorter substeps make contacts stiffer: no material gives a stiffness"
+
+
+def _largest_step(scene: Scene, few: Scene, fidelity: Fidelity) -> tuple[float, str]:
+    """The largest step in s that is stable whatever touches, and the body that limits it."""
+    parts = [scene] if few is scene else neighbourhoods(scene, _kinds_of(scene), crowded=True)
+    found = (largest_safe_step(part, fidelity, *build(part, fidelity)) for part in parts)
+    return min(found, default=(math.inf, ""))
+
+
+def _refusal(scene: Scene, fidelity: Fidelity) -> str:
+    """Why a World refuses a fidelity; "" if it doesn't."""
     try:
-        check_solver(scene, fidelity, is_crowd(scene, fidelity, False))
-        check_integrator(few, fidelity, model)
-        check_step(few, fidelity, model, features)
+        World(scene, fidelity)
     except ValueError as error:
-        yield f"a World refuses it: {error}"
+        return str(error)
+    return ""
 
 
 def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:
@@ -222,10 +240,13 @@ def _kind(solid: Any) -> str:
 
 def _costs(scene: Scene, fidelity: Fidelity, worlds: int) -> Iterator[str]:
     parts = parts_cost(scene, fidelity, worlds)
+    if math.isinf(parts[-1].cost):
+        yield f"unknown, for the scene doesn't stay finite: {parts[-1].note}"
+        return
     whole = sum(part.cost for part in parts if part.cost < math.inf)
     for part in parts:
         if math.isinf(part.cost):
-            yield f"{part.name:18} can't be simulated alone"
+            yield f"{part.name:18} can't be simulated without what follows"
         else:
             yield f"{part.name:18} {1e9 * part.cost:8,.0f} ns  {100 * part.cost / whole:4.0f} %"
     if fidelity.integrator != "adaptive":

@@ -65,7 +65,9 @@ METRICS: dict[str, Metric] = {
     "orientation": Metric("rad", "angle of a body from the reference", _orientation),
     "velocity": Metric("m/s", "difference of a linear velocity from the reference", _velocity),
     "energy": Metric(
-        "", "difference of the energy's change, relative to the largest kinetic energy", _energy
+        "",
+        "difference of the energy's change, relative to the largest kinetic energy or change",
+        _energy,
     ),
     "penetration": Metric("m", "deepest penetration", _penetration, needs_reference=False),
 }

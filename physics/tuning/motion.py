@@ -44,6 +44,7 @@ class Motion(NamedTuple):
         energy: [frames + 1, worlds] J, kinetic and potential.
         kinetic: [frames + 1, worlds] J.
         penetration: [frames + 1, worlds] m.
+        speed: [frames + 1, worlds] m/s, of the fastest body or drive.
     """
 
     position: Array
@@ -52,6 +53,7 @@ class Motion(NamedTuple):
     energy: Array
     kinetic: Array
     penetration: Array
+    speed: Array
 
 
 class Simulated(NamedTuple):
@@ -100,9 +102,15 @@ def simulate(course: Course, fidelity: Fidelity, *, timed: bool = True) -> Simul
         course: what happens.
         fidelity: how accurately it is simulated.
         timed: repeat short simulations until their cost can be measured.
+
+    Raises:
+        Exception: whatever `start` or `control` raise.
     """
     try:
         world = World(course.scene, fidelity, course.worlds, threads=1)
+    except ValueError as error:
+        return Simulated(None, note=str(error))
+    try:
         # compiles, so that the cost is that of later runs
         world.advance(fidelity.substep)
         motion, spent = _run(world, course)
@@ -110,7 +118,7 @@ def simulate(course: Course, fidelity: Fidelity, *, timed: bool = True) -> Simul
         while timed and total < _MEASURED and repeats < _REPEATS:
             again = _run(world, course)[1]
             shortest, total, repeats = min(shortest, again), total + again, repeats + 1
-    except (ValueError, SimulationDiverged) as error:
+    except SimulationDiverged as error:
         return Simulated(None, note=str(error))
     return Simulated(motion, shortest / course.simulated)
 
@@ -133,6 +141,7 @@ def _run(world: World, course: Course) -> tuple[Motion, float]:
 
 def _read(world: World) -> tuple[Array, ...]:
     kinetic = world.kinetic_energy()
+    velocities = np.concatenate([world.linear_velocity, world.drive_velocity], axis=1)
     return (
         world.position.copy(),
         world.orientation.copy(),
@@ -140,4 +149,5 @@ def _read(world: World) -> tuple[Array, ...]:
         kinetic + world.potential_energy(),
         kinetic,
         world.penetration().copy(),
+        np.linalg.norm(velocities, axis=-1).max(axis=1, initial=0.0),
     )

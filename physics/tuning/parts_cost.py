@@ -20,10 +20,12 @@ class Part(NamedTuple):
     Attributes:
         name: what was added.
         cost: s per substep and world, on one thread, with others side by side; inf: refused.
+        note: why it is refused, or diverges.
     """
 
     name: str
     cost: float
+    note: str = ""
 
 
 def parts_cost(scene: Scene, fidelity: Fidelity, worlds: int) -> list[Part]:
@@ -37,7 +39,7 @@ def parts_cost(scene: Scene, fidelity: Fidelity, worlds: int) -> list[Part]:
         course = Course(partial, _FRAMES, _FRAME, worlds)
         simulated = simulate(course, fidelity)
         if simulated.motion is None:
-            found.append(Part(name, math.inf))
+            found.append(Part(name, math.inf, simulated.note))
             continue
         # no part costs less than nothing; a measured time is a little off
         cost = max(simulated.cost * _step(fidelity), before)

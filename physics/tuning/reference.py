@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.scene import Scene
 from physics.tuning.candidates import can_touch, with_substep
 from physics.tuning.metrics import Metric
 from physics.tuning.motion import FRAME, Course, Motion, simulate
@@ -30,7 +31,7 @@ class Reference(NamedTuple):
         motion: None if no step was accepted or the motion is chaotic.
         uncertainty: by how much halving the step changed the metric.
         description: how it was found.
-        horizon: s, until when the two finest motions agree within the tolerance.
+        horizon: s, until when the two finest motions agree well enough for the tolerance.
         disagreement: of the other law's reference, in the unit of the metric; nan if unknown.
     """
 
@@ -41,11 +42,16 @@ class Reference(NamedTuple):
     disagreement: float = math.nan
 
 
-def _fine(law: str, scene_touches: bool) -> Fidelity:
-    if not scene_touches:
-        return Fidelity(integrator="rk4")
+def _fine(scene: Scene, law: str) -> tuple[Fidelity, str]:
+    """The fidelity whose step is halved, and its name."""
+    if not can_touch(scene):
+        # Runge-Kutta methods hold neither joints nor drives
+        integrator = "midpoint" if scene.joints or scene.drives else "rk4"
+        return Fidelity(integrator=integrator), integrator
     base = PRESETS["accurate"]
-    return base if law == "spring" else replace(PRESETS["solid"], spacing=base.spacing)
+    if law == "impulse":
+        base = replace(PRESETS["solid"], spacing=base.spacing)
+    return base, f"{law} law"
 
 
 def converged(
@@ -60,9 +66,7 @@ def converged(
         law: "spring" or "impulse".
         budget: s of wall time, about.
     """
-    touches = can_touch(course.scene)
-    base, spent = _fine(law, touches), 0.0
-    method = f"{law} law" if touches else "rk4"
+    (base, method), spent = _fine(course.scene, law), 0.0
     count, before, note = _FIRST, None, ""
     reference = Reference(None, math.inf, "", 0.0)
     while count <= _LAST:
@@ -73,7 +77,7 @@ def converged(
         else:
             if before is not None:
                 apart = metric.distance(before, found.motion)
-                within = apart <= tolerance
+                within = apart <= CONVERGED * tolerance
                 frames = len(apart) if within.all() else int(within.argmin())
                 text = f"{method}, substep {1e3 * fidelity.substep:g} ms"
                 horizon = max(frames - 1, 0) * course.frame

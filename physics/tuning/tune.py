@@ -7,7 +7,7 @@ from typing import NamedTuple
 from physics.scene.fidelity import LAWS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.validation import choice, instance, integer, positive
-from physics.tuning.candidates import families
+from physics.tuning.candidates import families, safe_speed
 from physics.tuning.description import code
 from physics.tuning.metrics import METRICS, Metric
 from physics.tuning.motion import FRAME, Control, Course, Start, side_by_side, simulate
@@ -160,7 +160,13 @@ def tune(
     good = [e for e in evidence if e.error <= tolerance]
     if not good:
         least = min(e.error for e in evidence)
-        reason = f"the smallest error of {len(evidence)} fidelities is {least:.2g} {measure.unit}"
+        if math.isinf(least):
+            reason = (
+                f"all {len(evidence)} fidelities are refused or fail, the last: {evidence[-1].note}"
+            )
+        else:
+            unit = measure.unit
+            reason = f"the smallest error of {len(evidence)} fidelities is {least:.2g} {unit}"
         return Tuned(None, least, math.inf, evidence, reference, name, tolerance, reason.strip())
     best = min(good, key=lambda e: e.cost)
     return Tuned(best.fidelity, best.error, best.cost, evidence, reference, name, tolerance)
@@ -183,11 +189,14 @@ def _try_all(
             if spent + 2.0 * took > _TRIES and not exhaustive:
                 break  # the next one takes up to twice as long as the last
             found = simulate(course, fidelity)
-            error = math.inf
+            error, note = math.inf, found.note
             if found.motion is not None:
                 base = found.motion if reference.motion is None else reference.motion
                 error = float(metric.distance(found.motion, base).max())
-            evidence.append(Evidence(family.name, fidelity, error, found.cost, found.note))
+                if reference.motion is None:  # which would show what passes through
+                    note = _passing(course.scene, fidelity, float(found.motion.speed.max()))
+                    error = math.inf if note else error
+            evidence.append(Evidence(family.name, fidelity, error, found.cost, note))
             if found.motion is not None:
                 took = found.cost * course.simulated
                 spent += took
@@ -200,6 +209,17 @@ def _try_all(
     return tuple(evidence)
 
 
+def _passing(scene: Scene, fidelity: Fidelity, speed: float) -> str:
+    """Why a small penetration proves nothing: something may have passed through; else ""."""
+    safe, thin = safe_speed(scene, fidelity)
+    if speed <= safe:
+        return ""
+    return (
+        f"at {speed:.3g} m/s something moves {1e3 * speed * fidelity.substep:.3g} mm in a substep "
+        f"and may pass through the thinnest solid, {1e3 * thin:.3g} mm"
+    )
+
+
 def _unknown(reference: Reference, metric: Metric, tolerance: float, time: float) -> str:
     """Why nothing can be compared with a reference that isn't known."""
     if reference.motion is None:
@@ -210,16 +230,22 @@ def _unknown(reference: Reference, metric: Metric, tolerance: float, time: float
         f"{reference.uncertainty:.2g}{unit}"
     )
     if reference.horizon >= time:
-        enough = reference.uncertainty / CONVERGED
+        enough = _rounded_up(reference.uncertainty / CONVERGED)
         return (
-            f"the reference isn't known well enough: {changes}; a tolerance of {enough:.2g}{unit} "
+            f"the reference isn't known well enough: {changes}; a tolerance of {enough:g}{unit} "
             "can be tuned for"
         )
     if reference.horizon > 0.0:
         until = (
-            f"it is known within {tolerance:g}{unit} for the first {reference.horizon:.2g} of "
-            f"{time:g} s: tune with time={reference.horizon:.2g}, or with metric='penetration'"
+            f"it is known well enough for the first {reference.horizon:g} of {time:g} s: tune with "
+            f"time={reference.horizon:g}, or with metric='penetration'"
         )
     else:
         until = "not even its first frame is known: tune with metric='penetration'"
     return f"the motion is chaotic, or needs shorter steps than can be tried: {changes}; {until}"
+
+
+def _rounded_up(value: float) -> float:
+    """To two digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / unit * (1.0 - 1e-9)) * unit

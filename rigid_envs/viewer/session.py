@@ -124,8 +124,9 @@ class Session:
         self.steps += 1
         self._setting_steps += 1
         time_now = self.steps * self.runner.task.frame
-        rewards = step.reward
-        self._rewards.append((time_now, rewards.mean(), rewards.min(), rewards.max()))
+        rewards = step.reward[~self._ended]  # what starts an episode has no reward yet
+        if len(rewards):
+            self._rewards.append((time_now, rewards.mean(), rewards.min(), rewards.max()))
         self._ended = ended = step.terminated | step.truncated
         self.finished += int(ended.sum())
         self.solved += int(self.success[ended].sum())

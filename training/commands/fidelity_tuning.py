@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 
 from physics import Tuned, World, tune
+from physics.tuning.motion import FRAME
 from rigid_envs.episodes.runner import Runner
+from rigid_envs.vector_env import RigidVectorEnv
 from training.policies.policy import Policy
 from training.settings.environments import make_vector_env
+from training.settings.errors import UsageError
 
 Array = np.ndarray
 
@@ -17,27 +20,42 @@ WORLDS = 16  # episodes
 RECORDED_AT = "balanced"  # fidelity at which the actions are recorded
 
 
-def recorded(policy: Policy, steps: int, seed: int) -> tuple[Any, Array]:
+def recorded(
+    policy: Policy, steps: int, seed: int, **env_kwargs: Any
+) -> tuple[RigidVectorEnv, Array]:
     """Plays episodes, and returns their environment at the start and the actions.
 
     Args:
         policy: what acts.
         steps: number of environment steps.
         seed: of the first episode.
+        env_kwargs: arguments of the environment that replace those of the policy's training.
 
     Returns:
         The vector environment, reset to the start of the episodes, and actions [steps, worlds, n].
+
+    Raises:
+        UsageError: bodies are to be randomized, or it isn't an environment of rigid-envs.
     """
-    kwargs = {**policy.env_kwargs, "max_episode_steps": -1}
+    if env_kwargs.get("randomize"):
+        raise UsageError(
+            "--env-kwargs: 'randomize' is not allowed here: errors are measured with the "
+            "parameters of the scene, so leave it out"
+        )
+    kwargs = {**policy.env_kwargs, **env_kwargs, "max_episode_steps": -1}
     kwargs.setdefault("fidelity", RECORDED_AT)
-    envs = make_vector_env(policy.env_id, WORLDS, **kwargs)
+    kwargs.pop("randomize", None)  # of a policy that was trained with it
+    envs = make_vector_env(policy.env_id, WORLDS, **kwargs).unwrapped
+    if not isinstance(envs, RigidVectorEnv):
+        raise UsageError(f"{policy.env_id} has no fidelity: it isn't an environment of rigid-envs")
     observation, _ = envs.reset(seed=seed)
     actions = []
     for _ in range(steps):
-        actions.append(np.asarray(policy.act(observation), dtype=np.float64))
-        observation, *_ = envs.step(actions[-1].astype(np.float32))
+        # as the environment takes them, for rounding them would change the motion
+        actions.append(np.asarray(policy.act(observation), dtype=np.float32))
+        observation, *_ = envs.step(actions[-1])
     envs.reset(seed=seed)
-    return envs, np.stack(actions)
+    return envs, np.stack(actions).astype(np.float64)
 
 
 def course(runner: Runner, actions: Array) -> tuple[Callable[[World], None], Any]:
@@ -59,11 +77,20 @@ def course(runner: Runner, actions: Array) -> tuple[Callable[[World], None], Any
 
 
 def run(
-    policy: Policy, tolerance: float, metric: str, time: float, law: str | None, seed: int
+    policy: Policy,
+    tolerance: float,
+    metric: str,
+    time: float,
+    law: str | None,
+    seed: int,
+    **env_kwargs: Any,
 ) -> Tuned:
-    """Tunes for the episodes of a policy, whose actions are repeated at every fidelity."""
-    envs, actions = recorded(policy, max(1, round(time / 0.04)), seed)
-    runner: Runner = envs.unwrapped._runner
+    """Tunes for the episodes of a policy, whose actions are repeated at every fidelity.
+
+    For arguments see `tune` and `recorded`.
+    """
+    envs, actions = recorded(policy, max(1, round(time / FRAME)), seed, **env_kwargs)
+    runner = envs.runner
     start, control = course(runner, np.clip(actions, -1.0, 1.0))
     print(f"{policy.env_id}, {WORLDS} episodes of {policy.name}, the first {time:g} s")
     tuned = tune(

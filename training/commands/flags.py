@@ -97,7 +97,9 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(
         algo=None, fidelity=None, stochastic=False, trust_pickle=False, device="cpu"
     )
-    parser.add_argument("--env", default=DEFAULT_ENV, help="environment id (default: %(default)s)")
+    parser.add_argument(
+        "--env", help=f"environment id (default: that of the policy, or {DEFAULT_ENV})"
+    )
     parser.add_argument(
         "--policy", default="scripted", metavar="POLICY",
         help='whose actions are repeated: run folder, .policy file or "scripted" (default)',

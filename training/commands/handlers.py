@@ -72,7 +72,7 @@ def tune_fidelity(options: argparse.Namespace) -> int:
     try:
         tuned = fidelity_tuning.run(
             policy_of(options), options.tolerance, options.metric, options.time, options.law,
-            options.seed or 0,
+            options.seed or 0, **env_kwargs_of(options),
         )  # fmt: skip
     except ValueError as error:
         raise UsageError(str(error)) from None

@@ -6,6 +6,7 @@ import pytest
 
 from physics import PRESETS, Attractor, Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
 from physics.reference.scenes import block_on_ground, tower
+from physics.tuning.motion import Course, simulate
 
 CUBE = block_on_ground(mass=0.1)
 
@@ -46,6 +47,32 @@ def test_it_says_when_a_world_would_refuse():
     assert "a World refuses it: Material.stiffness" in Fidelity().explain(scene, costs=False)
 
 
+def test_the_refusal_is_that_of_a_world_whatever_refuses_it():
+    stiff = Material(0.5, 0.0, stiffness=3e4)
+    newton = Fidelity(law="impulse", solver="newton", contact_resolution=50.0)
+    balls = Scene([Body(Sphere(0.02), mass=0.1, material=stiff, position=(0, 0, 0.02 + 0.05 * i))
+                   for i in range(20)], [Ground(stiff)])  # fmt: skip
+    for scene, fidelity in (
+        (CUBE, Fidelity(integrator="adaptive")), (tower(40), newton), (balls, Fidelity()),
+    ):  # fmt: skip
+        with pytest.raises(ValueError) as error:  # noqa: PT011
+            World(scene, fidelity)
+        text = fidelity.explain(scene)
+        assert f"a World refuses it: {error.value}" in text
+        assert "Cost" not in text
+
+
+def test_the_largest_step_does_not_depend_on_the_number_of_bodies():
+    stiff = Material(0.5, 0.0, stiffness=3e4)
+    found = set()
+    for n in (12, 13, 20):
+        bodies = [Body(Sphere(0.02), mass=0.1, material=stiff, position=(0, 0, 0.02 + 0.05 * i))
+                  for i in range(n)]  # fmt: skip
+        text = Fidelity().explain(Scene(bodies, [Ground(stiff)]), costs=False)
+        found.add(re.search(r"stable whatever touches: ([\d.]+) ms", text)[1])
+    assert len(found) == 1
+
+
 def test_the_speed_that_passes_through_is_half_a_width_per_substep():
     text = Fidelity(substep=1e-3).explain(CUBE, costs=False)
     assert "faster than 20 m/s can pass through the thinnest solid, 40 mm" in text
@@ -60,6 +87,8 @@ def test_costs_add_up_to_the_whole():
     assert list(costs) == ["motion of bodies", "contacts", "friction", "all"]
     assert costs["all"] == pytest.approx(sum(list(costs.values())[:-1]), abs=3)
     assert costs["contacts"] > 0.0
+    substep = 1e9 * simulate(Course(CUBE, 5, 0.02, 16), Fidelity()).cost * Fidelity().substep
+    assert costs["all"] == pytest.approx(substep, rel=0.5)
 
 
 def test_many_bodies_are_listed_by_kind():
