@@ -99,11 +99,11 @@ def test_a_chaotic_motion_is_answered_with_none_and_why():
     tuned = tune(tumbling, 1e-3, time=3.0)
     advised = float(re.search(r"tune with time=([\d.]+)", tuned.reason)[1])
     assert 0.1 < advised < 3.0
-    assert tune(tumbling, 1e-3, time=advised).reason.startswith(("", "the smallest error"))
+    reason = tune(tumbling, 1e-3, time=advised).reason
+    assert not reason or reason.startswith("the smallest error")
 
 
-@pytest.mark.usefixtures("few")
-def test_a_tolerance_that_it_advises_is_one_that_is_known():
+def test_a_tolerance_that_it_advises_is_rounded_up():
     assert [_rounded_up(x) for x in (0.00123, 0.0012, 1.0, 0.0991)] == pytest.approx(
         [0.0013, 0.0012, 1.0, 0.1]
     )
