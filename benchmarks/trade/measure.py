@@ -1,4 +1,4 @@
-"""Measures trials: python -m benchmarks trade [trial ...] [--restart] [--data CSV]."""
+"""Measures trials: python -m benchmarks trade [trial ...] [--restart] [--errors CURVE]."""
 
 import argparse
 import math
@@ -70,6 +70,24 @@ def _judged(trial: Trial, setting: Setting) -> store.Row:
     )  # fmt: skip
 
 
+def with_new_errors(trial: Trial, rows: list[store.Row], begins: str) -> list[store.Row]:
+    """Rows of a trial with the errors of some of our curves measured again; costs stay.
+
+    `begins`: with what the names of the curves begin.
+    """
+    chosen = {s.key: s for s in ours(trial) if s.curve.startswith(begins)}
+    own = [row for row in rows if row.key in chosen]
+    found, begin = {}, perf_counter()
+    for k, row in enumerate(own):
+        new = _judged(trial, chosen[row.key])
+        if new.error < WRONG and math.isnan(row.one):
+            print(f"\n{row.curve}, {row.label} has no cost yet: measure again with --restart")
+        found[row.key] = new._replace(one=row.one, many=row.many)
+        _progress(trial, "errors", k + 1, len(own), begin)
+    print()
+    return [found.get(row.key, row) for row in rows]
+
+
 def _larger(before: float, rate: float) -> float:
     return rate if math.isnan(before) else max(before, rate)
 
@@ -86,6 +104,10 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("trials", nargs="*", metavar="trial", help=", ".join(TRIALS))
     parser.add_argument("--data", type=Path, default=store.PATH, metavar="CSV")
     parser.add_argument("--restart", action="store_true", help="measure again what is in the file")
+    parser.add_argument(
+        "--errors", metavar="CURVE",
+        help="measure only errors again, of our curves whose names begin with this",
+    )  # fmt: skip
     options = parser.parse_args(arguments)
     if unknown := [name for name in options.trials if name not in TRIALS]:
         parser.error(f"unknown trial: {', '.join(unknown)}; known: {', '.join(TRIALS)}")
@@ -99,7 +121,13 @@ def main(arguments: list[str]) -> None:
         for name in names:
             store.Partial(options.data, name).remove()
     done = {row.trial for row in rows}
-    for name in names:
+    for name in names if options.errors else ():
+        if name in done:
+            own = [row for row in rows if row.trial == name]
+            rows = [row for row in rows if row.trial != name]
+            rows += with_new_errors(TRIALS[name], own, options.errors)
+            store.replace_all(rows, options.data)
+    for name in names if not options.errors else ():
         if name in done:
             print(f"{name}: is in {options.data.name}; --restart measures it again")
             continue

@@ -15,8 +15,11 @@ decrease the energy even where the cone cuts it. Resistance against rolling and 
 law for the relative angular velocity.
 
 The sweep that relaxes takes back normal impulses of the last step where the solids are apart, and
-friction with them, as far as it exceeds mu times what is left. Where nothing is left, the contact
-has ended: its friction and its resistance stay, for to take them back would drive what slides.
+friction with them, as far as it exceeds mu times what is left. That gives energy back: as much as
+friction took too much, if the sliding velocity is still nearly what it was. This holds for what
+slid. What stuck didn't slide at all, and if by now it does, something else drives it, to which
+friction must not add: it stays. So do friction and resistance where no normal impulse is left,
+for the contact has ended.
 """
 
 import math
@@ -32,6 +35,8 @@ ANCHOR_RATE = 5.0
 # 1/s, rate at which an anchor forgets. Two points at the same place that came to stick at different
 # times could otherwise be at rest only by pulling against each other, ever harder
 ANCHOR_DECAY = 0.1
+# relative to its square: friction so near its limit slid
+_AT_LIMIT = 1e-9
 
 
 @stage
@@ -144,10 +149,13 @@ def make_sweep(features):
                     qx *= cut
                     qy *= cut
                     qz *= cut
-                    if not soft:  # the friction of a contact that has ended stays
-                        qx = px if ended else qx
-                        qy = py if ended else qy
-                        qz = pz if ended else qz
+                    if not soft:  # friction stays where the contact stuck or has ended
+                        most = mu * before
+                        slid = px * px + py * py + pz * pz >= (1.0 - _AT_LIMIT) * most * most
+                        stays = ended | (apart & (not slid))
+                        qx = px if stays else qx
+                        qy = py if stays else qy
+                        qz = pz if stays else qz
                     if newton:
                         qx = qx if moves[i] != 0 else px
                         qy = qy if moves[i] != 0 else py
