@@ -76,9 +76,14 @@ def promises_table() -> Table:
         [name, float(p.cubes), 1e3 * p.sink, p.slide, p.restitution, p.creep]
         for name, p in PROMISES.items()
     ]
-    columns = ["preset", "cubes that stand for 10 s", "sink at rest, mm", "error of a slide"]
+    columns = [
+        "preset",
+        "cubes that stand for 10 s, at least",
+        "sink at rest, mm",
+        "error of a slide",
+    ]
     columns += ["error of restitution, ball", "creep on 20°, m/s"]
-    return Table(PROMISES_TABLE, "At most, for cubes of 4 cm", columns, rows)
+    return Table(PROMISES_TABLE, "Limits that each preset keeps, for cubes of 4 cm", columns, rows)
 
 
 def _titled(table: Table) -> str:

@@ -33,6 +33,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.misc.appdirs import AppDirs
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -74,7 +75,25 @@ def name_files_by_key(entry: Any) -> None:
     """Lets an entry that numba caches keep its kernels in `EntryFiles`."""
     files = entry._cache._cache_file
     base = files._index_name.removesuffix(".nbi")
-    entry._cache._cache_file = EntryFiles(files._cache_path, base, files._source_stamp)
+    folder = _outside_packages(files._cache_path)
+    entry._cache._cache_file = EntryFiles(folder, base, files._source_stamp)
+
+
+def _outside_packages(folder: str) -> str:
+    """Where to keep compiled code that numba would keep in `folder`.
+
+    For a package that pip has installed, a folder of the user's: pip removes only files that it
+    knows, and what it leaves would count as a package and hide one that is installed later.
+    """
+    if numba.config.CACHE_DIR or "site-packages" not in _PACKAGE.parts:
+        return folder
+    name = hashlib.sha256(folder.encode()).hexdigest()[:16]
+    own = Path(AppDirs("rigid-envs", appauthor=False).user_cache_dir) / name
+    try:
+        own.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return folder
+    return str(own)
 
 
 def is_cacheable(stage: Any) -> bool:
@@ -103,7 +122,7 @@ def _identity(value: Any) -> Any:
 @cache
 def _folder() -> Path:
     """Where numba keeps the compiled code of this package."""
-    return Path(FunctionCache(_identity).cache_path)
+    return Path(_outside_packages(FunctionCache(_identity).cache_path))
 
 
 class StageFile:

@@ -45,10 +45,23 @@ def safe_speed(scene: Scene, fidelity: Fidelity) -> tuple[float, float]:
     Half a width per substep: the next sample lies where the surface pushes back to the side that
     the body came from. Infinite where nothing can touch or impacts are found within a step.
     """
-    if fidelity.time_control in FIND_IMPACTS or not can_touch(scene):
+    if fidelity.time_control in FIND_IMPACTS:
         return math.inf, math.inf
-    solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
-    thin = min(solid.shape.width for solid in solids if not isinstance(solid, Ground))
+    moving = [*scene.bodies, *scene.driven_bodies]
+    # alike solids count once; the ground has no other side
+    others = [solid for solid in scene.statics if not isinstance(solid, Ground)]
+    kinds = {(s.shape, s.group, s.mask): s for s in moving}
+    twice = [s for s in moving if s is not kinds[s.shape, s.group, s.mask]]
+    second = {(s.shape, s.group, s.mask): s for s in (*twice, *others)}
+    thin = min(
+        (
+            min(a.shape.width, b.shape.width)
+            for a in kinds.values()
+            for b in (*kinds.values(), *second.values())
+            if a is not b and touch_each_other(a, b)
+        ),
+        default=math.inf,
+    )
     return 0.5 * thin / fidelity.substep, thin
 
 

@@ -100,7 +100,7 @@ def _modelled(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[
     if features.rotation == GENERAL:
         yield "rotation: all of Euler's equations, gyroscopic terms included"
     elif features.rotation == ISOTROPIC:
-        yield "rotation: of bodies with equal moments of inertia, which have no gyroscopic terms"
+        yield "rotation: of bodies with three equal moments of inertia, so without gyroscopic terms"
     if can_touch(scene):
         geometry = "samples against exact surfaces"
         if fidelity.geometry == "particle":
@@ -185,7 +185,10 @@ def _steps(
             yield "a longer one is stable unless that lies flat on several others at once"
         solids = (*few.bodies, *few.driven_bodies, *few.statics)
         if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
-            yield "shorter substeps make contacts stiffer: no material gives a stiffness"
+            yield (
+                "no material gives a stiffness: shorter substeps make contacts stiffer, and this "
+                "limit shorter, longer ones both softer and longer"
+            )
 
 
 def _largest_step(scene: Scene, few: Scene, fidelity: Fidelity) -> tuple[float, str]:

@@ -95,13 +95,16 @@ class Course(NamedTuple):
         return self.frames * self.frame * self.worlds
 
 
-def simulate(course: Course, fidelity: Fidelity, *, timed: bool = True) -> Simulated:
+def simulate(
+    course: Course, fidelity: Fidelity, *, timed: bool = True, closely: bool = False
+) -> Simulated:
     """Simulates a course at a fidelity.
 
     Args:
         course: what happens.
         fidelity: how accurately it is simulated.
         timed: repeat short simulations until their cost can be measured.
+        closely: read penetrations and speeds after every substep, not only after frames.
 
     Raises:
         Exception: whatever `start` or `control` raise.
@@ -118,30 +121,41 @@ def simulate(course: Course, fidelity: Fidelity, *, timed: bool = True) -> Simul
         while timed and total < _MEASURED and repeats < _REPEATS:
             again = _run(world, course)[1]
             shortest, total, repeats = min(shortest, again), total + again, repeats + 1
+        if closely:
+            motion = _run(world, course, fidelity.substep)[0]
     except SimulationDiverged as error:
         return Simulated(None, note=str(error))
     return Simulated(motion, shortest / course.simulated)
 
 
-def _run(world: World, course: Course) -> tuple[Motion, float]:
-    """The motion, and the s that the engine needed for it."""
+def _run(world: World, course: Course, piece: float = math.inf) -> tuple[Motion, float]:
+    """The motion, and the s that the engine needed for it.
+
+    Of the readings every `piece` s within a frame, the largest penetration and speed count.
+    """
     world.reset()
+    pieces = max(1, math.ceil(course.frame / piece * (1.0 - 1e-9)))
     if course.start is not None:
         course.start(world)
     frames, spent = [_read(world)], 0.0
     for k in range(course.frames):
         if course.control is not None:
             course.control(world, k)
-        begin = perf_counter()
-        world.advance(course.frame)
-        spent += perf_counter() - begin
-        frames.append(_read(world))
+        penetration, speed = np.zeros(world.count), np.zeros(world.count)
+        for _ in range(pieces):
+            begin = perf_counter()
+            world.advance(course.frame / pieces)
+            spent += perf_counter() - begin
+            if pieces > 1:
+                penetration = np.maximum(penetration, world.penetration())
+                speed = np.maximum(speed, _speed(world))
+        *others, last, fastest = _read(world)
+        frames.append((*others, np.maximum(last, penetration), np.maximum(fastest, speed)))
     return Motion(*(np.stack(values) for values in zip(*frames, strict=True))), spent
 
 
 def _read(world: World) -> tuple[Array, ...]:
     kinetic = world.kinetic_energy()
-    velocities = np.concatenate([world.linear_velocity, world.drive_velocity], axis=1)
     return (
         world.position.copy(),
         world.orientation.copy(),
@@ -149,5 +163,10 @@ def _read(world: World) -> tuple[Array, ...]:
         kinetic + world.potential_energy(),
         kinetic,
         world.penetration().copy(),
-        np.linalg.norm(velocities, axis=-1).max(axis=1, initial=0.0),
+        _speed(world),
     )
+
+
+def _speed(world: World) -> Array:
+    velocities = np.concatenate([world.linear_velocity, world.drive_velocity], axis=1)
+    return np.asarray(np.linalg.norm(velocities, axis=-1).max(axis=1, initial=0.0))

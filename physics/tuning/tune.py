@@ -95,7 +95,10 @@ class Tuned(NamedTuple):
                 mark = "*" if e.fidelity == self.fidelity else " "
                 rate = f"{1.0 / e.cost:,.0f}"
                 lines.append(f"{e.error:12.2g}  {rate:>9} {mark}{code(e.fidelity)}")
-            lines.append(f"{len(self.evidence)} fidelities tried, these are nearest")
+            lines.append(
+                f"{len(self.evidence)} fidelities tried; these {len(near)} are within the "
+                "tolerance, or nearest to it, in the order of their speed"
+            )
         return "\n".join(lines)
 
 
@@ -166,7 +169,10 @@ def tune(
             )
         else:
             unit = measure.unit
-            reason = f"the smallest error of {len(evidence)} fidelities is {least:.2g} {unit}"
+            reason = (
+                f"the smallest error of {len(evidence)} fidelities is {least:.2g} {unit}".strip()
+                + f"; a tolerance of {_rounded_up(least):g} can be met, or try a shorter time"
+            )
         return Tuned(None, least, math.inf, evidence, reference, name, tolerance, reason.strip())
     best = min(good, key=lambda e: e.cost)
     return Tuned(best.fidelity, best.error, best.cost, evidence, reference, name, tolerance)
@@ -188,7 +194,7 @@ def _try_all(
         for fidelity in family.members:
             if spent + 2.0 * took > _TRIES and not exhaustive:
                 break  # the next one takes up to twice as long as the last
-            found = simulate(course, fidelity)
+            found = simulate(course, fidelity, closely=reference.motion is None)
             error, note = math.inf, found.note
             if found.motion is not None:
                 base = found.motion if reference.motion is None else reference.motion

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 
 from physics import Tuned, World, tune
+from physics.scene.fidelity import LAWS
+from physics.scene.validation import choice
+from physics.tuning.metrics import METRICS
 from physics.tuning.motion import FRAME
 from rigid_envs.episodes.runner import Runner
 from rigid_envs.vector_env import RigidVectorEnv
@@ -89,6 +92,9 @@ def run(
 
     For arguments see `tune` and `recorded`.
     """
+    choice("metric", metric, METRICS)  # at once, not after kernels have been compiled
+    if law is not None:
+        choice("law", law, LAWS)
     envs, actions = recorded(policy, max(1, round(time / FRAME)), seed, **env_kwargs)
     runner = envs.runner
     start, control = course(runner, np.clip(actions, -1.0, 1.0))

@@ -38,8 +38,8 @@ def trained_policy(
     the standard deviation. Loading them can run any code that they contain.
 
     Args:
-        path: A run folder, a .policy file, or a model.zip with statistics and settings in the same
-            folder.
+        path: A run folder, a .policy file or the folder of one, or a model.zip with statistics and
+            settings in the same folder.
         algo: Algorithm; required only for a model.zip outside a run folder.
         env_id: Environment id; required only for a model.zip outside a run folder, otherwise it
             replaces the one of training.
@@ -54,6 +54,9 @@ def trained_policy(
     if algo is not None and algo not in ALGORITHMS:
         raise UsageError(f"unknown algorithm {algo!r}; did you mean {nearest(algo, ALGORITHMS)!r}?")
     check_exists(path, f"a run folder, a {SUFFIX} file or a model.zip")
+    exported = path / f"policy{SUFFIX}"
+    if exported.is_file() and not (path / "run.json").exists():  # as the folders in results/
+        path = exported
     if path.is_dir():
         folder = RunFolder(path)
         config = folder.config()

@@ -88,6 +88,16 @@ def test_a_second_process_compiles_nothing(copied):
     assert {p: p.stat().st_mtime_ns for p in cache.rglob("*.nb*")} == files
 
 
+def test_an_installed_package_keeps_its_code_with_the_user(tmp_path):
+    packages, home = tmp_path / "site-packages", tmp_path / "home"
+    shutil.copytree(PACKAGE, packages / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    assert run(FALL, "", packages, XDG_CACHE_HOME=str(home), HOME=str(home))[1] == 1.0
+    assert not list(packages.rglob("*.nb*")) + list(packages.rglob("*.stage"))
+    if sys.platform == "linux":
+        assert list(home.rglob("*.nbc"))
+        assert list(home.rglob("*.stage"))
+
+
 def test_a_second_kernel_takes_its_common_stages_from_the_disk(copied):
     root, cache, (_, _, height) = copied
     before = {p: p.stat().st_mtime_ns for p in cache.rglob("*.stage")}

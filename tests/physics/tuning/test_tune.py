@@ -23,7 +23,7 @@ from physics import (
     tune,
 )
 from physics.reference.closed_forms import slide_distance
-from physics.reference.scenes import GRAVITY, block_on_ground
+from physics.reference.scenes import GRAVITY, block_on_ground, sphere_on_ground
 from physics.tuning import tune as module
 from physics.tuning.candidates import can_touch, families
 from physics.tuning.description import code
@@ -161,6 +161,20 @@ def test_where_nothing_touches_joints_and_drives_have_a_reference(holder):
     assert tuned.reference.description.startswith("midpoint, substep")
     assert tuned.fidelity.integrator in ("midpoint", "euler")
     assert tuned.error <= 1e-3
+
+
+@pytest.mark.usefixtures("few")
+def test_a_penetration_between_frames_counts():
+    scene = sphere_on_ground(position=(0, 0, 0.3), linear_velocity=(0, 0, -5.0))
+    tuned = tune(scene, 1e-3, "penetration", time=0.4, law="impulse")
+    world, deepest = World(scene, tuned.fidelity), 0.0
+    substeps = math.ceil(0.04 / tuned.fidelity.substep * (1.0 - 1e-9))
+    for _ in range(10 * substeps):
+        world.advance(0.04 / substeps)
+        deepest = max(deepest, world.penetration()[0])
+    assert tuned.error == pytest.approx(deepest, rel=1e-6, abs=1e-12)
+    assert deepest <= 1e-3
+    assert any(e.error > 1e-3 for e in tuned.evidence)
 
 
 @pytest.mark.usefixtures("few")
