@@ -85,7 +85,7 @@ def _outside_packages(folder: str) -> str:
     For a package that pip has installed, a folder of the user's: pip removes only files that it
     knows, and what it leaves would count as a package and hide one that is installed later.
     """
-    if numba.config.CACHE_DIR or "site-packages" not in _PACKAGE.parts:
+    if getattr(numba.config, "CACHE_DIR", "") or "site-packages" not in _PACKAGE.parts:
         return folder
     name = hashlib.sha256(folder.encode()).hexdigest()[:16]
     own = Path(AppDirs("rigid-envs", appauthor=False).user_cache_dir) / name

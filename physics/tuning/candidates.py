@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+from physics.scene.drives import Drive
 from physics.scene.fidelity import FIND_IMPACTS, PRESETS, Fidelity
 from physics.scene.scene import Scene
-from physics.scene.solids import Ground, touch_each_other
+from physics.scene.solids import Body, Ground, touch_each_other
 from physics.tuning.motion import FRAME
 
 # substeps per frame of 40 ms: 1, then two or three values per octave up to 62.5 us
@@ -47,7 +48,7 @@ def safe_speed(scene: Scene, fidelity: Fidelity) -> tuple[float, float]:
     """
     if fidelity.time_control in FIND_IMPACTS:
         return math.inf, math.inf
-    moving = [*scene.bodies, *scene.driven_bodies]
+    moving: list[Body | Drive] = [*scene.bodies, *scene.driven_bodies]
     # alike solids count once; the ground has no other side
     others = [solid for solid in scene.statics if not isinstance(solid, Ground)]
     kinds = {(s.shape, s.group, s.mask): s for s in moving}
