@@ -1,10 +1,9 @@
 """Draws the pictures of README.md and docs: python -m benchmarks.plots [name ...].
 
-Plots show the tables of benchmarks/results.json; tasks.png shows policies of results/.
+Plots show the tables of benchmarks/results.json; the pictures of tasks show policies of results/.
 """
 
 import argparse
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -33,7 +32,8 @@ class Plot(NamedTuple):
 PLOTS = {
     "env_steps": Plot("worlds", env_steps.draw, ROOT / "docs/images/env_steps.png"),
 }
-TASKS = ROOT / "docs/images/tasks.png"
+# the animation of all tasks, and frames of an episode of each
+FILM = ROOT / "docs/images/tasks.gif"
 # plots of docs/trade/trade.csv: their trials
 TRADE = {
     ROOT / "docs/images/trade.png": (
@@ -48,7 +48,7 @@ TRADE = {
 
 def run() -> None:
     """Draws all pictures, or those named."""
-    names = [*PLOTS, "trade", "tasks"]
+    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
     options = parser.parse_args()
@@ -57,8 +57,9 @@ def run() -> None:
     saved = load()
     for name in options.names or names:
         if name == "tasks":
-            os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-            tasks.draw(path := TASKS)
+            tasks.draw_film(path := FILM)
+        elif name in tasks.STRIPS:
+            tasks.draw_strip(name, path := ROOT / f"docs/images/{name}.png")
         elif name == "trade":
             rows = store.load()
             done = {row.trial for row in rows}

@@ -1,5 +1,6 @@
 """The single environment: one world as a Gymnasium environment."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -9,6 +10,7 @@ from gymnasium.envs.registration import EnvSpec
 from physics import Fidelity
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import check_seed
+from rigid_envs.episodes.pixels import pixel_settings
 from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
@@ -25,9 +27,12 @@ class RigidEnv(gym.Env[Observation, Array]):
         reward_type: "sparse" (-1 or 0) or "dense" (shaped).
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" or "human".
+        width: of a frame in pixels.
+        height: of a frame in pixels.
+        camera: where frames are taken from: "task", "front", "side", "back" or "top", a dict with
+            position, target (m) or field_of_view (degrees), or a Camera; the task's own if None.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
-        render_size: width and height of a frame in pixels.
         max_episode_steps: number of steps after which an episode is truncated; the task's number if
             None, no limit if -1. `gym.make` does not pass its own argument of this name on: it
             wraps the environment in a TimeLimit, which then replaces the task's number.
@@ -38,6 +43,12 @@ class RigidEnv(gym.Env[Observation, Array]):
         observe_task_guide: append the task's guide to the observation: what is left to do, computed
             from both goals. Do not use it with learners that relabel goals (HER): the guide would
             still show the original goal.
+        obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
+            [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
+            the state is observed as `state`.
+        pixels: "rgb" (3 channels), "depth", "segmentation", or a tuple of several.
+        pixel_size: width and height of an observed picture, or (width, height).
+        frame_stack: how many steps' pictures are stacked along the channels, the last step's last.
         **arguments: arguments of the task, such as `blocks`.
     """
 
@@ -50,14 +61,20 @@ class RigidEnv(gym.Env[Observation, Array]):
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",
         render_mode: str | None = None,
+        width: int = 480,
+        height: int = 480,
+        camera: Any = None,
         show_forces: bool = False,
         show_particles: bool = False,
-        render_size: int = 480,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
         randomize: Any = None,
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
+        obs_type: str = "state",
+        pixels: str | Sequence[str] = "rgb",
+        pixel_size: int | tuple[int, int] = 84,
+        frame_stack: int = 1,
         **arguments: Any,
     ) -> None:
         """Builds the world. Call `reset` to start an episode."""
@@ -73,10 +90,11 @@ class RigidEnv(gym.Env[Observation, Array]):
             randomize,
             observe_parameters,
             observe_task_guide,
+            pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
         )
         self._limit_is_default = max_episode_steps is None
         self._pictures = Pictures(
-            self._runner, render_mode, show_forces, show_particles, size=render_size
+            self._runner, render_mode, width, height, camera, show_forces, show_particles
         )
         self.observation_space: Any = self._runner.observation_space
         self.action_space = self._runner.action_space
@@ -190,7 +208,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         return self._runner.compute_truncated(achieved_goal, info)
 
     def render(self) -> Array | None:
-        """A frame [480, 480, 3] uint8 in "rgb_array" mode; draws the window in "human" mode."""
+        """A frame [height, width, 3] uint8 with "rgb_array"; "human" draws the window."""
         if self.render_mode is None:
             gym.logger.warn(
                 'render() needs a render mode: gym.make(..., render_mode="rgb_array") or "human"'

@@ -1,5 +1,6 @@
 """The vector environment: many worlds in one Gymnasium VectorEnv, with no Python loop over them."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -11,6 +12,7 @@ from physics import Fidelity
 from physics.scene.validation import choice, integer
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, check_seed
+from rigid_envs.episodes.pixels import pixel_settings
 from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
@@ -31,10 +33,13 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         reward_type: "sparse" (-1 or 0) or "dense" (shaped).
         fidelity: "fast", "balanced", "accurate", "solid" or a physics.Fidelity.
         render_mode: None, "rgb_array" (one frame per world) or "human" (a grid of frames).
+        width: of a world's frame in pixels.
+        height: of a world's frame in pixels.
+        camera: where frames are taken from: "task", "front", "side", "back" or "top", a dict with
+            position, target (m) or field_of_view (degrees), or a Camera; the task's own if None.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
         render_worlds: largest number of worlds to draw; the first ones are drawn.
-        render_size: width and height of a world's frame in pixels.
         max_episode_steps: number of steps after which an episode is truncated; the task's number if
             None, no limit if -1.
         terminate_on_success: whether success terminates an episode.
@@ -46,6 +51,12 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         observe_task_guide: append the task's guide to the observation: what is left to do, computed
             from both goals. Do not use it with learners that relabel goals (HER): the guide would
             still show the original goal.
+        obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
+            [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
+            the state is observed as `state`.
+        pixels: "rgb" (3 channels), "depth", "segmentation", or a tuple of several.
+        pixel_size: width and height of an observed picture, or (width, height).
+        frame_stack: how many steps' pictures are stacked along the channels, the last step's last.
         **arguments: arguments of the task, such as `blocks`.
     """
 
@@ -62,10 +73,12 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         reward_type: str = "sparse",
         fidelity: str | Fidelity = "balanced",
         render_mode: str | None = None,
+        width: int = 480,
+        height: int = 480,
+        camera: Any = None,
         show_forces: bool = False,
         show_particles: bool = False,
         render_worlds: int = 16,
-        render_size: int = 480,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -73,6 +86,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         randomize: Any = None,
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
+        obs_type: str = "state",
+        pixels: str | Sequence[str] = "rgb",
+        pixel_size: int | tuple[int, int] = 84,
+        frame_stack: int = 1,
         **arguments: Any,
     ) -> None:
         """Builds the worlds. Call `reset` to start episodes."""
@@ -91,9 +108,17 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             randomize,
             observe_parameters,
             observe_task_guide,
+            pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
         )
         self._pictures = Pictures(
-            self._runner, render_mode, show_forces, show_particles, render_worlds, render_size
+            self._runner,
+            render_mode,
+            width,
+            height,
+            camera,
+            show_forces,
+            show_particles,
+            render_worlds,
         )
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self.single_observation_space = self._runner.observation_space

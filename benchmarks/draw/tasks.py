@@ -1,64 +1,120 @@
-"""Picture: the three tasks side by side, played by recorded policies."""
+"""Pictures of the tasks: frames of an episode in a row, and an animation of all three tasks.
 
+Trained policies of results/ play; the tower of three is built by the scripted controller.
+"""
+
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from PIL import Image
 
 from benchmarks.report.provenance import ROOT
 from training.policies.policy_file import read_policy
+from training.scripted import controller_for
 from training.settings.environments import make_single_env
 
+Array = np.ndarray
 
-class Shot(NamedTuple):
-    """One frame of an episode.
+GAP = 8  # pixels between frames
+
+
+class Strip(NamedTuple):
+    """Frames of an episode side by side.
 
     Attributes:
-        task: name of the task.
+        task: its name.
         seed: of the episode.
-        step: environment step at which it is drawn.
-        left, top, size: the square of the frame that is shown, as fractions of its width.
+        steps: after which a frame is drawn.
+        arguments: of the environment; with any, the scripted controller plays.
     """
 
     task: str
     seed: int
-    step: int
-    left: float
-    top: float
-    size: float
+    steps: tuple[int, ...]
+    arguments: dict[str, Any]
 
 
-SHOTS = (
-    Shot("Push", 1_000_000, 8, 0.40, 0.27, 0.52),
-    Shot("Stack", 1_000_000, 30, 0.22, 0.18, 0.66),
-    Shot("Throw", 1_000_000, 11, 0.27, 0.06, 0.46),
-)
-SIZE = 400  # pixels, width and height of each frame
-GAP = 8  # pixels between frames
+STRIPS = {
+    "push": Strip("Push", 1_000_000, (0, 5, 12), {}),
+    "stack": Strip("Stack", 1_000_000, (0, 14, 60, 140), {"blocks": 3}),
+    "throw": Strip("Throw", 1_000_000, (2, 6, 10, 14), {}),
+}
+SIZE = 360  # pixels of a strip's frame
+
+# the animation: how many steps are shown of each task's episodes, of which every second is drawn
+FILM_STEPS, FILM_LENGTH, EVERY = {"Push": 24, "Stack": 48, "Throw": 24}, 96, 2
+FILM_SIZE, FILM_FPS, COLORS = 300, 12.5, 128
 
 
-def draw(path: Path) -> None:
-    """Writes a PNG of the three frames in a row."""
-    picture = Image.new("RGB", (len(SHOTS) * (SIZE + GAP) - GAP, SIZE), "white")
-    for n, shot in enumerate(SHOTS):
-        picture.paste(Image.fromarray(_frame(shot)), (n * (SIZE + GAP), 0))
+def draw_strip(name: str, path: Path) -> None:
+    """Writes a PNG of the frames of an episode."""
+    strip = STRIPS[name]
+    frames = episode(strip.task, strip.seed, max(strip.steps), SIZE, **strip.arguments)
+    shown = [frame for step, frame in enumerate(frames) if step in strip.steps]
+    picture = Image.new("RGB", (len(shown) * (SIZE + GAP) - GAP, SIZE), "white")
+    for n, frame in enumerate(shown):
+        picture.paste(Image.fromarray(frame), (n * (SIZE + GAP), 0))
     path.parent.mkdir(parents=True, exist_ok=True)
     picture.save(path, optimize=True)
 
 
-def _frame(shot: Shot) -> np.ndarray:
-    policy = read_policy(ROOT / f"results/ppo/RigidEnvs-{shot.task}-v0_seed0/policy.policy")
-    pixels = round(SIZE / shot.size)
-    arguments = {**policy.env_kwargs, "render_mode": "rgb_array", "render_size": pixels}
-    with closing(make_single_env(policy.env_id, **arguments)) as env:
-        observation, _ = env.reset(seed=shot.seed)
-        for _ in range(shot.step):
+def draw_film(path: Path) -> None:
+    """Writes a GIF of the three tasks side by side."""
+    columns = [
+        [
+            frame
+            for k in range(FILM_LENGTH // steps)
+            for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1::EVERY]
+        ]
+        for task, steps in FILM_STEPS.items()
+    ]
+    gap = np.full((FILM_SIZE, GAP, 3), 255, np.uint8)
+    frames = [
+        Image.fromarray(np.concatenate([left, gap, middle, gap, right], axis=1))
+        for left, middle, right in zip(*columns, strict=True)
+    ]
+    # one palette for all frames, so that what stands still doesn't flicker
+    palette = _palette(frames[::4], COLORS)
+    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    flat[0].save(
+        path, save_all=True, append_images=flat[1:], duration=round(1000 / FILM_FPS), loop=0,
+        optimize=False,
+    )  # fmt: skip
+
+
+def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:
+    """Frames of an episode: one at the start, and one after each step."""
+    env_id, own, act = _player(task, arguments)
+    shown = {"render_mode": "rgb_array", "width": size, "height": size, "max_episode_steps": -1}
+    with closing(make_single_env(env_id, **{**own, **shown})) as env:
+        observation, _ = env.reset(seed=seed)
+        yield np.asarray(env.render())
+        for _ in range(steps):
             batch = {name: np.asarray(values)[None] for name, values in observation.items()}
-            action = np.asarray(policy.act(batch))[0].astype(env.action_space.dtype)
+            action = np.asarray(act(batch))[0].astype(env.action_space.dtype)
             observation = env.step(action)[0]
-        frame = env.render()
-    assert isinstance(frame, np.ndarray)
-    row, column = round(shot.top * pixels), round(shot.left * pixels)
-    return frame[row : row + SIZE, column : column + SIZE]
+            yield np.asarray(env.render())
+
+
+def _palette(pictures: list[Image.Image], colors: int) -> Image.Image:
+    """Colours for all pictures, in which those of small solids have places beside the ground's."""
+    pixels = np.concatenate([np.asarray(picture).reshape(-1, 3) for picture in pictures])
+    kinds, counts = np.unique(pixels >> 2, axis=0, return_counts=True)
+    often = np.ceil(counts**0.25).astype(int)
+    rows = np.repeat((kinds << 2) + 2, often, axis=0).astype(np.uint8)
+    return Image.fromarray(rows[None]).quantize(colors)
+
+
+def _player(
+    task: str, arguments: dict[str, Any]
+) -> tuple[str, dict[str, Any], Callable[[dict[str, Array]], Any]]:
+    """Id and arguments of the environment, and who acts."""
+    if arguments:
+        env_id = f"RigidEnvs/{task}-v0"
+        return env_id, arguments, controller_for(env_id)
+    policy = read_policy(ROOT / f"results/ppo/RigidEnvs-{task}-v0_seed0/policy.policy")
+    return policy.env_id, policy.env_kwargs, policy.act

@@ -38,15 +38,16 @@ from numba.misc.appdirs import AppDirs
 _PACKAGE = Path(__file__).parents[1]
 
 
-def _hash_sources() -> int:
+def hash_sources(folder: Path) -> int:
+    """A hash of all Python files in a folder and below it."""
     digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode())
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode())
         digest.update(path.read_bytes())
     return int.from_bytes(digest.digest()[:7], "big")  # a numba integer has eight bytes, signed
 
 
-SOURCES: int = _hash_sources()
+SOURCES: int = hash_sources(_PACKAGE)
 
 # settings of numba, by environment variables, that change the code
 _SETTINGS = (

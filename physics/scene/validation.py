@@ -57,19 +57,20 @@ def positive(field: str, value: Any) -> float:
     return number(field, value, low=0.0, exclusive=True)
 
 
-def integer(field: str, value: Any, *, low: int) -> int:
-    """Returns `value` as an int of at least `low`.
+def integer(field: str, value: Any, *, low: int, high: int = _LARGEST) -> int:
+    """Returns `value` as an int from `low` to `high`, by default the largest of kernels.
 
     Raises:
         TypeError: not an integer (a bool is not accepted).
-        ValueError: below `low`, or beyond the integers of kernels.
+        ValueError: out of range.
     """
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise TypeError(f"{field} must be an integer, got {value!r} ({type(value).__name__})")
     if value < low:
         raise ValueError(f"{field} must be at least {low}, got {value!r}")
-    if value > _LARGEST:
-        raise ValueError(f"{field} must be at most 2**62, got {value!r}")
+    if value > high:
+        limit = "2**62" if high == _LARGEST else high
+        raise ValueError(f"{field} must be at most {limit}, got {value!r}")
     return int(value)
 
 

@@ -13,6 +13,7 @@ from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.columns import clip_actions, split
 from rigid_envs.episodes.draws import uniform
+from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
 from rigid_envs.tasks import Task
@@ -29,7 +30,7 @@ class Step(NamedTuple):
     """The result of one step of all worlds.
 
     Attributes:
-        observation: dict of arrays [count, ...] float32.
+        observation: dict of arrays [count, ...], float32 or pixels.
         reward: [count].
         terminated: [count] bool.
         truncated: [count] bool.
@@ -58,6 +59,7 @@ class Runner:
         randomize: ranges of parameters that are drawn for each episode, see `Randomization`.
         observe_parameters: append the drawn parameters to the observation.
         observe_task_guide: append the task's guide to the observation, see `Task.guide`.
+        pixels: what pixels are observed; None if only the state is.
         **arguments: arguments of the task, if it is given by name or class.
 
     Attributes:
@@ -78,6 +80,7 @@ class Runner:
         randomize: Any = None,
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
+        pixels: PixelSettings | None = None,
         **arguments: Any,
     ) -> None:
         """Builds the worlds. Call `reset` to start episodes."""
@@ -114,13 +117,18 @@ class Runner:
         low, high = _limits(self.bounds)
         goal_low, goal_high = _limits(self.task.goal_bounds)
         self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
-        self.observation_space = spaces.Dict(
-            {
-                "observation": spaces.Box(low, high, dtype=np.float32),
-                "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
-                "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
-            }
-        )
+        observed: dict[str, spaces.Space[Any]] = {
+            "observation": spaces.Box(low, high, dtype=np.float32),
+            "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+            "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+        }
+        self._pixels, self._keeps_state = None, pixels is not None and pixels.keeps_state
+        if pixels is not None:
+            self._pixels = Pixels(self, pixels)
+            if self._keeps_state:
+                observed["state"] = observed["observation"]
+            observed["observation"] = self._pixels.space
+        self.observation_space = spaces.Dict(observed)
         size = (len(self.task.actions),)
         self.action_space = spaces.Box(-1.0, 1.0, size, dtype=np.float32)
 
@@ -175,6 +183,8 @@ class Runner:
         draws = uniform(self._seeds[mask], self._episodes[mask], self.task.draw_count)
         goals = self.task.start(self.world, mask, draws)
         self._goals[mask] = check_goals(self.task, "start", goals, len(draws))
+        if self._pixels:
+            self._pixels.started(mask)
         self._now = self.world.read()
 
     def _randomize(self, mask: Array, randomize: Any) -> None:
@@ -299,6 +309,10 @@ class Runner:
             "achieved_goal": rows.achieved,
             "desired_goal": rows.desired,
         }
+        if self._pixels:
+            if self._keeps_state:
+                observation["state"] = rows.observation
+            observation["observation"] = self._pixels.observe()
         success: Array = self.reward.success(self._goal_distance)
         terms = self.task.terms(self.world, now, achieved, desired, self._goal_distance)
         if not self._observed:
@@ -362,6 +376,8 @@ class Runner:
             self.world.advance(self.task.frame, None if reset_mask is None else ~reset_mask)
         finally:
             self._now = self.world.read()
+            if self._pixels:
+                self._pixels.stepped()
         if reset_mask is not None:
             self.reset(reset_mask)
         observation, info = self.observe()
@@ -411,6 +427,7 @@ class Runner:
 
         After `set_state` with it, episodes continue bitwise identically.
         """
+        pixels = {"pixels": self._pixels.get_state()} if self._pixels else {}
         return {
             "version": STATE_VERSION,
             "world": self.world.snapshot(),
@@ -419,6 +436,7 @@ class Runner:
             "elapsed": self._elapsed.copy(),
             "goals": self._goals.copy(),
             **self.randomization.get_state(),
+            **pixels,
         }
 
     def set_state(self, state: Any) -> None:
@@ -428,6 +446,8 @@ class Runner:
             ValueError: not such a state; or one with another version, scene, fidelity or count.
         """
         wanted = {"version", "world", "seeds", "episodes", "elapsed", "goals", "ranges", "drawn"}
+        if self._pixels:
+            wanted.add("pixels")
         if not isinstance(state, dict) or set(state) != wanted:
             raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
         if state["version"] != STATE_VERSION:
@@ -443,6 +463,8 @@ class Runner:
         self._seeds[:], self._episodes[:] = state["seeds"], state["episodes"]
         self._elapsed[:], self._goals[:] = state["elapsed"], state["goals"]
         self._seeded = bool(np.all(self._episodes >= 0))
+        if self._pixels:
+            self._pixels.set_state(state["pixels"])
 
 
 def _limits(bounds: tuple[tuple[str, str, float, float], ...]) -> tuple[Array, Array]:

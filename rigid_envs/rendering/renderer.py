@@ -1,221 +1,188 @@
-"""A small software renderer: shaded solids, soft shadows and a ruled ground, drawn with pygame.
+"""A software renderer: colours, depths and solids of pictures of many worlds, without a display.
 
-All is drawn at `SUPERSAMPLING` times the size of the picture and then reduced, which smooths the
-edges. What there is to see is in `view`, how a solid is drawn in `painter`.
+Every solid is cut with the rays of the pixels that it may cover, so that pictures are exact: there
+are no polygons and no textures. What there is to see is in `view`.
 """
 
+import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from physics.rotation import rotation_matrix
 from physics.scene.validation import integer
+from physics.step.threads import run_in_blocks
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.painter import GHOST_FILL, Painter, whole
-from rigid_envs.rendering.solids import ACROSS_LIGHT, CIRCLE, LIGHTS, SHADOW_SAMPLES, Solids
-from rigid_envs.rendering.view import (
-    TO_LIGHT,
-    Arrow,
-    Ghost,
-    Goal,
-    Item,
-    Mark,
-    Marker,
-    Particles,
-    ground,
-)
-from rigid_envs.rendering.window import INK, load_pygame
-
-__all__ = [
-    "TO_LIGHT",
-    "Arrow",
-    "Camera",
-    "Ghost",
-    "Goal",
-    "Item",
-    "Mark",
-    "Particles",
-    "Renderer",
-    "grid",
-]
+from rigid_envs.rendering.ground import ground
+from rigid_envs.rendering.rays.kernel import make_draw
+from rigid_envs.rendering.rays.light import TO_SUN, sun_points
+from rigid_envs.rendering.markers import Overlay, overlay, stacked
+from rigid_envs.rendering.primitives import balls, placed, shape_primitives
+from rigid_envs.rendering.rays.tables import PRIMITIVE
+from rigid_envs.rendering.view import Arrow, Item, Marker
 
 Array = np.ndarray
 
-SUPERSAMPLING = 2
-SHADOW_TINT = np.array([98.0, 92.0, 82.0])  # of 255, what full shadow takes; less blue, as the sky
-SCALE = "squares: 10 cm"  # written in the corner, as lines alone don't tell how far apart they are
-DISC_FILL, DISC_EDGE = 80, 210  # opacity of 255
+LARGEST = 4096  # pixels, width or height
+SOFT = 8  # points of the sun for soft shadows
+_FAINT = 0.24  # opacity of a shape around its particles
+_LEAST_BALL = 1.0  # pixels, radius; smaller particles would not be seen
+
+
+class Frames(NamedTuple):
+    """Pictures of worlds; None where it wasn't asked for.
+
+    Attributes:
+        rgb: [worlds, height, width, 3] uint8.
+        depth: [worlds, height, width] float32, m along the camera's forward axis; infinite where
+            there is nothing.
+        solid: [worlds, height, width] int32, the index of the solid that is seen, -1 for none.
+    """
+
+    rgb: Array | None
+    depth: Array | None
+    solid: Array | None
 
 
 class Renderer:
-    """Draws frames of solids on the ground, off screen: it needs no display.
-
-    A copy or pickle carries the settings.
+    """Draws solids on the ground. A copy or pickle carries the settings.
 
     Args:
-        width: pixels.
-        height: pixels.
+        width: pixels, 1 to 4096.
+        height: pixels, 1 to 4096.
         camera: where to look from; by default a square of 30 cm about the origin fills the picture.
+        fine: smooth borders and soft shadows.
+        threads: largest number of threads for pictures of many worlds.
 
     Raises:
-        ValueError: a size that is not positive.
-        DependencyNotInstalled: pygame is missing.
+        ValueError: a size out of its range.
     """
 
-    def __init__(self, width: int = 480, height: int = 480, camera: Camera | None = None) -> None:
-        self.width = integer("width", width, low=1)
-        self.height = integer("height", height, low=1)
-        self.camera = camera or Camera()
-        self._pygame = pygame = load_pygame()
-        size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
-        self._background, self._canvas = (pygame.Surface(size, depth=32) for _ in range(2))
-        size_of_picture = (self.width, self.height)
-        surfaces = [pygame.Surface(size_of_picture, depth=32) for _ in range(3)]
-        self._picture, self._shadow, self._layer = surfaces
-        self._painter = Painter(pygame, self._canvas, self.camera, SUPERSAMPLING)
-        pygame.surfarray.blit_array(self._background, ground(self.camera, *size))
-        self._scale = self._words(SCALE, max(self.height // 30, 12))
+    def __init__(
+        self,
+        width: int = 480,
+        height: int = 480,
+        camera: Camera | None = None,
+        *,
+        fine: bool = True,
+        threads: int = 1,
+    ) -> None:
+        self.width = integer("width", width, low=1, high=LARGEST)
+        self.height = integer("height", height, low=1, high=LARGEST)
+        self.camera, self.fine = camera or Camera(), fine
+        self.threads = integer("threads", threads, low=1)
+        self._points = sun_points(SOFT if fine else 1)
+        self._view = self.camera.table(self.width, self.height)
+        self._memory = threading.local()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Settings only: surfaces can't be copied."""
-        return Renderer, (self.width, self.height, self.camera)
+        """Settings only."""
+        settings = (self.width, self.height, self.camera, self.fine, self.threads)
+        return _renderer, settings
 
     def frame(
-        self,
-        items: Sequence[Item],
-        *,
-        markers: Sequence[Marker] = (),
-        forces: Sequence[Arrow] = (),
-        caption: str = "",
+        self, items: Sequence[Item], *, markers: Sequence[Marker] = (), forces: Sequence[Arrow] = ()
     ) -> Array:
-        """Draw one frame.
+        """A picture (height, width, 3) uint8 of one world.
 
         Args:
             items: the solids.
             markers: targets and marks.
             forces: arrows, drawn over everything else.
-            caption: text for the top left corner.
-
-        Returns:
-            A new array (height, width, 3) uint8.
         """
-        goals = [marker for marker in markers if isinstance(marker, Goal)]
-        balls = [goal for goal in goals if goal.position[2] > 0.0]
-        ghosts = self._painter.ghosts([marker for marker in markers if isinstance(marker, Ghost)])
-        colors = [item.color for item in items] + [ball.color for ball in balls]
-        solids = Solids(items, balls)
-        self._canvas.blit(self._background, (0, 0))
-        for goal in goals:
-            self._draw_disc(goal)
-        for marker in markers:
-            if isinstance(marker, Mark):
-                self._draw_mark(marker)
-        self._draw_shadows(*solids.outlines(ACROSS_LIGHT, len(items)))
-        for color, faces in ghosts:
-            self._painter.glass(color, faces, GHOST_FILL)
-        self._painter.draw_solids(solids, colors, [item.particles for item in items])
-        for color, faces in ghosts:
-            for face in faces:
-                self._painter.polygon(color, face, SUPERSAMPLING)
-        self._draw_arrows(forces)
-        self._pygame.transform.smoothscale(self._canvas, self._picture.get_size(), self._picture)
-        self._write(self._words(caption, max(self.height // 22, 14)), top=True)
-        self._write(self._scale, top=False)
-        return self._read()
+        rgb = self.frames(items, [self.overlay(markers, forces)]).rgb
+        assert rgb is not None
+        return np.asarray(rgb[0])
 
-    def _read(self) -> Array:
-        pixels = np.empty((self.height, self.width, 3), np.uint8)
-        memory: Any = pixels  # pygame takes any buffer, its type hints only some
-        frame = self._pygame.image.frombuffer(memory, (self.width, self.height), "RGB")
-        frame.blit(self._picture, (0, 0))
-        return pixels
+    def overlay(self, markers: Sequence[Marker], forces: Sequence[Arrow] = ()) -> Overlay:
+        """Markers and forces of a world, as `frames` takes them."""
+        return overlay(markers, forces, self.camera, self.width, self.height)
 
-    def _draw_disc(self, goal: Goal) -> None:
-        foot = np.array([*goal.position[:2], 0.0])
-        around = foot + goal.radius * np.pad(CIRCLE, ((0, 0), (0, 1)))
-        pixels, depth = self._painter.project(around)
-        if depth.min() < self.camera.near:
-            return
-        self._painter.glass(goal.color, [whole(pixels)], DISC_FILL, DISC_EDGE)
-        if goal.position[2] > goal.radius:  # a stem shows over which spot the ball hangs
-            ends = self._painter.project(np.array([foot, goal.position]))[0].tolist()
-            self._pygame.draw.line(self._canvas, goal.color, *ends, SUPERSAMPLING)
+    def frames(
+        self,
+        items: Sequence[Item],
+        overlays: Sequence[Overlay] = (),
+        *,
+        worlds: int = 1,
+        rgb: bool = True,
+        depth: bool = False,
+        solid: bool = False,
+        ground_solid: int = -1,
+    ) -> Frames:
+        """Pictures of many worlds. Each depends on what its world shows alone.
 
-    def _draw_mark(self, mark: Mark) -> None:
-        foot = np.array([*mark.position[:2], 0.0])
-        for along in (np.array([1.0, 1.0, 0.0]), np.array([1.0, -1.0, 0.0])):
-            along *= np.sqrt(0.5) * mark.radius
-            across = 0.25 * np.array([-along[1], along[0], 0.0])
-            arm = [along + across, along - across, -along - across, -along + across]
-            pixels, depth = self._painter.project(foot + np.array(arm))
-            if depth.min() > self.camera.near:
-                self._painter.polygon(mark.color, whole(pixels))
-
-    def _draw_shadows(self, outlines: Array, ends: list[int]) -> None:
-        """Darken the ground where solids hide the light; outlines [m, 3] m face the light.
-
-        Each point of the light removes its share from the union of the shadows that it casts. They
-        are soft, so the size of the picture is fine enough.
+        Args:
+            items: the solids.
+            overlays: what else is drawn in each world; none, or one for each.
+            worlds: how many.
+            rgb: whether colours are wanted.
+            depth: whether depths are wanted.
+            solid: whether the indices of the solids that are seen are wanted.
+            ground_solid: index of the ground.
         """
-        lights = LIGHTS[:, None]
-        cast = outlines - np.maximum(outlines[:, 2:], 0.0) * lights / lights[..., 2:]
-        cast[..., 2] = 0.0
-        pixels, depth = self._painter.project(cast)
-        pixels = np.rint(pixels / SUPERSAMPLING).astype(int)
-        starts = [0, *ends][:-1]
-        shown = [
-            slice(start, end)
-            for start, end in zip(starts, ends, strict=True)
-            if depth[:, start:end].min() > self.camera.near
-        ]
-        if not shown:
-            return
-        reach = np.concatenate([pixels[:, part] for part in shown], axis=1)
-        low, high = reach.min((0, 1)), reach.max((0, 1))
-        # one pixel more all around, for the way back to the canvas mixes neighbours
-        area = self._pygame.Rect((low - 1).tolist(), (high - low + 3).tolist())
-        area = area.clip(self._shadow.get_rect())
-        if not area:
-            return
-        tint = np.rint(SHADOW_TINT / SHADOW_SAMPLES).astype(int).tolist()
-        self._shadow.fill((255, 255, 255), area)
-        for points in pixels.tolist():
-            self._layer.fill((0, 0, 0), area)
-            for part in shown:
-                self._pygame.draw.polygon(self._layer, tint, points[part])
-            self._shadow.blit(self._layer, area, area, self._pygame.BLEND_RGB_SUB)
-        size = (SUPERSAMPLING * area.width, SUPERSAMPLING * area.height)
-        fine = self._pygame.transform.smoothscale(self._shadow.subsurface(area), size)
-        place = (SUPERSAMPLING * area.left, SUPERSAMPLING * area.top)
-        self._canvas.blit(fine, place, special_flags=self._pygame.BLEND_RGB_MULT)
+        size = (self.height, self.width)
+        solids, faint = self._tables(items, worlds)
+        glass, decals, polygons = stacked(overlays, worlds)
+        glass = np.concatenate([faint, glass], axis=1)
+        colors = np.empty((worlds if rgb else 0, *size, 3), np.uint8)
+        depths = np.empty((worlds if depth else 0, *size), np.float32)
+        indices = np.empty((worlds if solid else 0, *size), np.int32)
+        tiles, tile_depth = ground(self.camera, self.width, self.height)
+        kernel = make_draw()
 
-    def _draw_arrows(self, arrows: Sequence[Arrow]) -> None:
-        if not arrows:
-            return
-        origins = np.stack([arrow.origin for arrow in arrows])
-        ends = np.stack([origins, origins + np.stack([arrow.vector for arrow in arrows])], axis=1)
-        pixels, depth = self._painter.project(ends)
-        for arrow, (tail, tip), nearest in zip(arrows, pixels, depth.min(axis=1), strict=True):
-            length = float(np.hypot(*(tip - tail)))
-            if length < 1.0 or nearest < self.camera.near:
+        def run(first: int, last: int) -> int:
+            kernel(
+                first, last, solids, glass, decals, polygons, self._view, TO_SUN, self._points,
+                tiles, tile_depth, self.fine, *self._working_memory(), colors, depths, indices,
+                ground_solid,
+            )  # fmt: skip
+            return 0
+
+        run_in_blocks(run, worlds, self.threads)
+        return Frames(
+            colors if rgb else None, depths if depth else None, indices if solid else None
+        )
+
+    def _tables(self, items: Sequence[Item], worlds: int) -> tuple[Array, Array]:
+        """Primitives [worlds, n] of solids, and [worlds, g] of faint shapes around particles."""
+        solids, faint = [np.zeros((worlds, 0), PRIMITIVE)], [np.zeros((worlds, 0), PRIMITIVE)]
+        for item in items:
+            place = np.broadcast_to(item.position, (worlds, 3))
+            turn = rotation_matrix(np.broadcast_to(item.orientation, (worlds, 4)))
+            size = np.broadcast_to(item.size, worlds)
+            shape = placed(shape_primitives(item.shape), place, turn, size)
+            shape["color"], shape["solid"] = item.color, item.solid
+            if item.particles is None:
+                solids.append(shape)
                 continue
-            along = (tip - tail) / length
-            across = SUPERSAMPLING * np.array([-along[1], along[0]])
-            neck = tip - min(8.0 * SUPERSAMPLING, 0.6 * length) * along
-            left = [tail + across, neck + across, neck + 4.0 * across]
-            right = [neck - 4.0 * across, neck - across, tail - across]
-            self._painter.polygon(arrow.color, whole(np.array([*left, tip, *right])))
+            shape["opacity"] = _FAINT
+            faint.append(shape)
+            samples = placed(
+                balls(item.particles.positions, item.particles.radius), place, turn, size
+            )
+            samples["color"], samples["solid"] = item.color, item.solid
+            depth = (samples["position"] - self.camera.eye) @ self.camera.axes[2]
+            least = _LEAST_BALL * np.maximum(depth, 0.0) * self._view["pixel"][0]
+            for field in (samples["size"][..., 0], samples["reach"]):
+                np.maximum(field, least, out=field)
+            solids.append(samples)
+        return np.concatenate(solids, axis=1), np.concatenate(faint, axis=1)
 
-    def _words(self, text: str, size: int) -> Any:
-        font = self._pygame.font
-        if not text or not font:  # pygame without SDL_ttf has no fonts
-            return None
-        font.init()
-        return font.Font(None, size).render(text, True, INK)
+    def _working_memory(self) -> tuple[Array, ...]:
+        """Of this thread."""
+        if not hasattr(self._memory, "arrays"):
+            size = (self.height, self.width)
+            self._memory.arrays = (
+                np.empty(size), np.empty(size, np.int32), np.empty(size, np.uint8),
+                np.empty((*size, 3), np.uint8), np.empty((9, 2), np.int64),
+            )  # fmt: skip
+        arrays: tuple[Array, ...] = self._memory.arrays
+        return arrays
 
-    def _write(self, words: Any, *, top: bool) -> None:
-        if words is not None:
-            self._picture.blit(words, (10, 10 if top else self.height - 8 - words.get_height()))
+
+def _renderer(width: int, height: int, camera: Camera, fine: bool, threads: int) -> Renderer:
+    return Renderer(width, height, camera, fine=fine, threads=threads)
 
 
 def grid(frames: Sequence[Array], columns: int | None = None) -> Array:

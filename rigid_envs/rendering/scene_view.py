@@ -1,12 +1,10 @@
 """What a world looks like: its solids, goal and contact forces as items that a renderer draws."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from physics import Box, Compound, Cylinder, Gripper, Mesh, Part, Sphere, Static, Torus
-from physics import Particles as ParticleShape
-from physics.rotation import multiply, rotate
+from physics import Box, Capsule, Gripper, Sphere, Static
 from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
 
 if TYPE_CHECKING:
@@ -20,107 +18,58 @@ STATIC_COLOR = (170, 170, 165)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 # m of arrow to a newton
 FORCE_SCALE = 0.03
+# of a finger: the length of its rod in m, and its radius as a share of the tip's
+STEM, SLENDER = 0.12, 0.55
 # of a gripper's mechanism in m: its fingers' half thickness, how far the bar is above the hand and
 # how far it reaches beyond the fingers, half the bar's height, half the length of the post on it,
 # and the least distance of fingers that the bar is made for
 THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
 
 
-class Solid(NamedTuple):
-    """A solid as the scene describes it.
-
-    Attributes:
-        shape: of the size that it has in its world.
-        position: [3] m.
-        orientation: [4] quaternion x, y, z, w.
-        color: red, green, blue in 0..255.
-        balls: what it touches with, if that is to be drawn.
-    """
-
-    shape: Any
-    position: Array
-    orientation: Array
-    color: Color
-    balls: Particles | None = None
-
-
-def solids(runner: "Runner", world: int, *, particles: bool = False) -> list[Solid]:
-    """Bodies, drives and statics of one world but the ground, and grippers' arms.
+def items(runner: "Runner", worlds: Array, *, particles: bool = False) -> list[Item]:
+    """Bodies, drives and statics but the ground, and grippers' arms, each in all of some worlds.
 
     Args:
         runner: whose worlds.
-        world: index of the world.
+        worlds: [n], indices.
         particles: whether to add what the solids touch with.
     """
     engine, scene = runner.world, runner.world.scene
-    sizes = np.ones(len(scene.bodies))
+    position, orientation = engine.position[worlds], engine.orientation[worlds]
+    tools, count = engine.drive_position[worlds], len(worlds)
+    sizes = np.ones((count, len(scene.bodies)))
     if engine.features.per_world_parameters:
-        sizes = engine.parameters.size[world]
-    found: list[Solid] = []
-    for i, body in enumerate(scene.bodies):
-        shape = body.shape if sizes[i] == 1.0 else body.shape.scaled(float(sizes[i]))
-        pose = engine.position[world, i], engine.orientation[world, i]
-        balls = _particles(runner, i, body.shape) if particles else None
-        found.append(Solid(shape, *pose, BODY_COLORS[i % len(BODY_COLORS)], balls))
-    tools, first = engine.drive_position[world], len(scene.bodies)
+        sizes = engine.parameters.size[worlds]
+    upright = np.tile(UPRIGHT, (count, 1))
+
+    def item(k: int, shape: Any, place: Array, turn: Array, color: Color, size: Any = 1.0) -> Item:
+        balls = _particles(runner, k, shape) if particles else None
+        return Item(shape, place, turn, color, balls, k, size)
+
+    found = [
+        item(
+            i, body.shape, position[:, i], orientation[:, i],
+            BODY_COLORS[i % len(BODY_COLORS)], sizes[:, i],
+        )
+        for i, body in enumerate(scene.bodies)
+    ]  # fmt: skip
+    first = len(scene.bodies)
     for i, drive in enumerate(scene.driven_bodies):
-        balls = _particles(runner, first + i, drive.shape) if particles else None
-        turn = np.array(drive.orientation)
-        found.append(Solid(drive.shape, tools[i], turn, DRIVE_COLOR, balls))
+        turn = np.tile(drive.orientation, (count, 1))
+        found.append(item(first + i, drive.shape, tools[:, i], turn, DRIVE_COLOR))
+        if isinstance(drive.shape, Sphere):
+            found.append(_stem(drive.shape.radius, tools[:, i], upright, first + i))
+    first += len(scene.driven_bodies)
     for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
-            pose = np.array(static.position), np.array(static.orientation)
-            solid = first + len(scene.driven_bodies) + i
-            balls = _particles(runner, solid, static.shape) if particles else None
-            found.append(Solid(static.shape, *pose, STATIC_COLOR, balls))
+            place, turn = (
+                np.tile(static.position, (count, 1)),
+                np.tile(static.orientation, (count, 1)),
+            )
+            found.append(item(first + i, static.shape, place, turn, STATIC_COLOR))
     for i, gripper in scene.grippers:
-        found += _arm(gripper, tools[i], tools[i + 1])
-    return found
-
-
-def items(runner: "Runner", world: int, *, particles: bool = False) -> list[Item]:
-    """The solids of one world as items for the painter, as particles if asked for."""
-    drawn = solids(runner, world, particles=particles)
-    return [item for solid in drawn for item in _items(*solid)]
-
-
-def _items(
-    shape: object, position: Array, orientation: Array, color: Color, balls: Particles | None
-) -> list[Item]:
-    """A solid as an item; a compound as one for each part, each with the balls nearest to it.
-
-    A mesh is a box of faint lines around balls along its surface, particles are one around them; a
-    torus is a ring of balls.
-    """
-    if isinstance(shape, Torus):
-        ring = shape.particles(0.25 * shape.minor_radius)
-        disc = Cylinder(shape.reach, shape.minor_radius)
-        drawn = balls or Particles(ring.positions, ring.radius)
-        return [Item(disc, position, orientation, color, drawn)]
-    if isinstance(shape, ParticleShape):
-        half = np.abs(shape.points).max(axis=0) + shape.radius
-        drawn = Particles(shape.points, shape.radius)
-        return [Item(Box(tuple(half)), position, orientation, color, drawn)]
-    if isinstance(shape, Mesh):
-        samples = shape.samples(shape.width / 8.0, shape.width / 16.0)
-        drawn = balls or Particles(samples.positions, samples.radius)
-        box = Box(shape.surface(0.0).parameters)
-        return [Item(box, position, orientation, color, drawn)]
-    if not isinstance(shape, Compound):
-        return [Item(shape, position, orientation, color, balls)]
-    found, nearest = [], np.zeros(0)
-    if balls is not None:
-        apart = [part.distance(balls.positions) for part in shape.parts]  # type: ignore[union-attr]
-        nearest = np.argmin(apart, axis=0)
-    for k, part in enumerate(shape.parts):
-        assert isinstance(part, Part)
-        own = None
-        if balls is not None:
-            mine, radius = nearest == k, np.broadcast_to(balls.radius, len(nearest))
-            own = Particles(part.inward(balls.positions[mine]), radius[mine])
-        place = position + rotate(orientation, np.array(part.position))
-        turn = multiply(orientation, np.array(part.orientation))
-        found.append(Item(part.shape, place, turn, color, own))
+        near = len(scene.bodies) + i
+        found += _arm(gripper, tools[:, i], tools[:, i + 1], upright, near)
     return found
 
 
@@ -157,14 +106,27 @@ def _particles(runner: "Runner", solid: int, shape: object) -> Particles | None:
     return None if isinstance(shape, Sphere) or not len(positions) else Particles(positions, radius)
 
 
-def _arm(gripper: Gripper, near: Array, far: Array) -> list[Solid]:
-    """Fingers that hang from a bar with a post: nothing solid, for a person to see a gripper."""
+def _stem(radius: float, tip: Array, upright: Array, solid: int) -> Item:
+    """The rod that a finger with a ball as its tip hangs from, for a person to see a finger.
+
+    Nothing touches it. In pictures of solids it counts as the tip.
+    """
+    half = 0.5 * STEM
+    place = tip + np.array([0.0, 0.0, half])
+    return Item(Capsule(SLENDER * radius, half), place, upright, ARM_COLOR, solid=solid)
+
+
+def _arm(gripper: Gripper, near: Array, far: Array, upright: Array, solid: int) -> list[Item]:
+    """Fingers that hang from a bar with a post, for a person to see a gripper.
+
+    Nothing touches them. In pictures of solids they count as the near pad, `solid`.
+    """
     pad = 0.5 * gripper.shape.width
     hand, up = 0.5 * (near + far), np.array([0.0, 0.0, 1.0])
     length = 0.5 * (ABOVE - pad - BAR)  # half a finger's
-    apart = max(gripper.distance, float(far[1] - near[1]), NARROWEST)
-    half = 0.5 * apart + BEYOND
-    parts = [(Box((THIN, THIN, length)), end + (pad + length) * up) for end in (near, far)]
-    parts.append((Box((1.5 * THIN, half, BAR)), hand + ABOVE * up))
-    parts.append((Box((1.5 * THIN, 1.5 * THIN, POST)), hand + (ABOVE + BAR + POST) * up))
-    return [Solid(shape, position, UPRIGHT, ARM_COLOR) for shape, position in parts]
+    half = 0.5 * max(gripper.distance, NARROWEST) + BEYOND
+    finger, bar = Box((THIN, THIN, length)), Box((1.5 * THIN, half, BAR))
+    post = Box((1.5 * THIN, 1.5 * THIN, POST))
+    parts = [(finger, near + (pad + length) * up), (finger, far + (pad + length) * up)]
+    parts += [(bar, hand + ABOVE * up), (post, hand + (ABOVE + BAR + POST) * up)]
+    return [Item(shape, place, upright, ARM_COLOR, solid=solid) for shape, place in parts]

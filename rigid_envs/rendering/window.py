@@ -38,7 +38,7 @@ def load_pygame() -> Any:
         import pygame
     except ImportError as error:
         raise DependencyNotInstalled(
-            'rendering needs pygame: pip install "rigid-envs[render]"'
+            'a window needs pygame: pip install "rigid-envs[render]"'
         ) from error
     return pygame
 

@@ -70,7 +70,7 @@ class Push(Task):
     )
     goal_bounds = tuple((f"cube {a}", "m", -1.0, 1.0) for a in "xyz")
     draw_count = 3 + 2 * GOAL_DRAWS  # x, y and yaw of the block; x and y of each goal drawn
-    camera = Camera(target=(-0.03, -0.04, 0.15), distance=1.28)
+    camera = Camera.around((-0.03, -0.02, 0.04), 1.16, azimuth=-75.0, elevation=42.0)
     reward = Reward(THRESHOLD, {"success": 1.0, "distance": 10.0, "reach": 3.0})
     # a larger cube would touch the finger at home, and no place would be clear of all posts
     size_range = (0.0, 2.5)

@@ -70,7 +70,7 @@ class Stack(Task):
 
     hand = Hand(home=(0.0, 0.0, 0.2), low=(-0.2, -0.2, 0.016), high=(0.2, 0.2, 0.3), stride=0.05)
     # azimuth chosen so that the fingers close across the frame
-    camera = Camera(target=(0.0, 0.0, 0.14), distance=1.15, azimuth=-25.0, elevation=26.0)
+    camera = Camera.around((0.0, 0.0, 0.14), distance=1.15, azimuth=-25.0, elevation=26.0)
     max_episode_steps = 100
     # with smaller cubes, a cube next to the tower would be within the threshold of its goal on the
     # tower; with larger cubes, fingers that are open about a cube would reach the next cube

@@ -26,8 +26,8 @@ class Throw(Task):
     """The achieved goal is where the ball first touches the ground; until then, where it is."""
 
     hand = Hand(home=(-0.1, 0.0, 0.25), low=(-0.3, -0.2, 0.1), high=(0.3, 0.2, 0.5), stride=0.12)
-    # from the side to show the arc of a throw, and from behind to show the fingers
-    camera = Camera((0.4, 0.0, 0.16), 2.2, azimuth=-128.0, elevation=30.0, field_of_view=45.0)
+    # from behind, so that the hand and the ball are near, and from the side, to show the arc
+    camera = Camera.around((0.3, 0.03, 0.24), 1.9, -150.0, 20.0, field_of_view=38.0)
 
     actions = hand.actions
     bounds = (

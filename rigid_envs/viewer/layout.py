@@ -73,7 +73,8 @@ class Layout:
         corners = np.concatenate([np.tile(flat, (2, 1)), heights], axis=1)
         target = (0.0, 0.0, 0.25 * HEIGHT)
         elevation = max(tasks.elevation, LOWEST)
-        local = (corners - target) @ Camera(target, 1.0, tasks.azimuth, elevation).axes.T
+        local = (corners - target) @ Camera.around(target, 1.0, tasks.azimuth, elevation).axes.T
         slope = math.tan(math.radians(0.5 * tasks.field_of_view))
         needed = np.abs(local[:, :2]) / (slope * np.array([aspect, 1.0])) - local[:, 2:]
-        return Camera(target, float(needed.max()), tasks.azimuth, elevation, tasks.field_of_view)
+        distance, field = float(needed.max()), tasks.field_of_view
+        return Camera.around(target, distance, tasks.azimuth, elevation, field)

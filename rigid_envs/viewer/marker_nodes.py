@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
-from rigid_envs.rendering.solids import box_corners
+from rigid_envs.rendering.markers import box_corners
 from rigid_envs.rendering.view import Color, Ghost, Goal, Mark, Marker
 from rigid_envs.viewer.triangles import Triangles, cylinder, rounded
 

@@ -11,8 +11,8 @@ import viser
 from physics import Box, Ground
 from rigid_envs.episodes.runner import Runner
 from rigid_envs.rendering import scene_view
-from rigid_envs.rendering.scene_view import Solid
-from rigid_envs.rendering.view import TO_LIGHT, Arrow
+from rigid_envs.rendering.rays.light import TO_SUN
+from rigid_envs.rendering.view import Arrow, Item
 from rigid_envs.viewer.layout import CELL, Layout
 from rigid_envs.viewer.marker_nodes import MarkerNodes
 from rigid_envs.viewer.triangles import triangles
@@ -50,12 +50,7 @@ class SceneNodes:
         for static in runner.world.scene.statics:
             if isinstance(static, Ground):
                 self._add_floors(static.height)
-        first, *_ = worlds = self._solids()
-        self._made = [solid.shape for solid in first]
-        self._nodes = [
-            self._add_solid(k, solid, [world[k] for world in worlds])
-            for k, solid in enumerate(first)
-        ]
+        self._nodes = [self._add_solid(k, solid) for k, solid in enumerate(self._solids())]
 
     def update(self, forces: str, goals: bool) -> None:
         """Shows the worlds as they are now.
@@ -64,34 +59,30 @@ class SceneNodes:
             forces: one of `FORCES`.
             goals: whether to show the markers of the goals.
         """
-        worlds = self._solids()
         opacity = None if forces == FORCES[0] else GLASS
-        for k, node in enumerate(self._nodes):
+        for node, solid in zip(self._nodes, self._solids(), strict=True):
             node.opacity = opacity
-            solids = [world[k] for world in worlds]
-            node.batched_positions = self._positions(solids)
-            node.batched_wxyzs = _wxyz(solids)
-            scales = _scales(self._made[k], solids)
+            node.batched_positions = solid.position + self._offsets
+            node.batched_wxyzs = _wxyz(solid)
+            scales = _scales(solid)
             if not np.array_equal(scales, node.batched_scales):
                 node.batched_scales = scales
         self._markers.update(self._marked() if goals else [])
         self._show_arrows(forces)
 
-    def _solids(self) -> list[list[Solid]]:
-        return [scene_view.solids(self._runner, i) for i in range(self._runner.count)]
+    def _solids(self) -> list[Item]:
+        """Every solid, with its poses in all worlds."""
+        return scene_view.items(self._runner, np.arange(self._runner.count))
 
-    def _positions(self, solids: list[Solid]) -> Array:
-        return np.array([solid.position for solid in solids]) + self._offsets
-
-    def _add_solid(self, k: int, solid: Solid, solids: list[Solid]) -> Any:
+    def _add_solid(self, k: int, solid: Item) -> Any:
         mesh = triangles(solid.shape)
         return self._scene.add_batched_meshes_simple(
             f"/solid {k}",
             mesh.vertices,
             mesh.faces,
-            _wxyz(solids),
-            self._positions(solids),
-            batched_scales=_scales(solid.shape, solids),
+            _wxyz(solid),
+            solid.position + self._offsets,
+            batched_scales=_scales(solid),
             batched_colors=solid.color,
             lod="off",
         )
@@ -164,7 +155,7 @@ def _add_light(scene: viser.SceneApi) -> None:
     scene.add_light_hemisphere(
         "/sky", sky_color=(255, 255, 255), ground_color=(200, 196, 190), intensity=0.55
     )
-    x, y, z = (5.0 * TO_LIGHT).tolist()
+    x, y, z = (5.0 * TO_SUN).tolist()
     scene.add_light_directional(
         "/sun",
         color=(255, 250, 240),
@@ -174,14 +165,12 @@ def _add_light(scene: viser.SceneApi) -> None:
     )
 
 
-def _wxyz(solids: list[Solid]) -> Array:
+def _wxyz(solid: Item) -> Array:
     """[n, 4] quaternions w, x, y, z."""
-    return np.array([solid.orientation for solid in solids])[:, [3, 0, 1, 2]]
+    return np.asarray(solid.orientation[:, [3, 0, 1, 2]])
 
 
-def _scales(made: Any, solids: list[Solid]) -> Array:
-    """[n, 3] factors along the body axes from the shape that was made to each solid's."""
-    if isinstance(made, Box):
-        return np.array([solid.shape.half_extents for solid in solids]) / made.half_extents
-    factors = np.array([solid.shape.reach for solid in solids]) / made.reach
-    return np.repeat(factors[:, None], 3, axis=1)
+def _scales(solid: Item) -> Array:
+    """[n, 3], by which the solid is larger than its shape."""
+    sizes = np.broadcast_to(solid.size, len(solid.position))
+    return np.repeat(sizes[:, None], 3, axis=1)

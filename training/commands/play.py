@@ -130,10 +130,10 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
     Raises:
         UsageError: The id or an argument is invalid, or there is no display.
     """
-    arguments = {"max_episode_steps": -1, "render_size": SIZE, **env_kwargs}
+    arguments = {"max_episode_steps": -1, "width": SIZE, "height": SIZE, **env_kwargs}
     env = make_single_env(env_id, render_mode="rgb_array", **arguments)
-    size, played = arguments["render_size"], 0
-    window = Window(size, size, fps, f"{env_id}: play", len(HELP) + 1)
+    width, height, played = arguments["width"], arguments["height"], 0
+    window = Window(width, height, fps, f"{env_id}: play", len(HELP) + 1)
     with closing(env), closing(window):
         game = Game(env, seed)
         while not (window.closed or game.quit):

@@ -195,14 +195,15 @@ def test_a_scripted_controller_copes_with_other_sizes(env_id, steps, least):
 def test_a_picture_shows_the_size_that_was_drawn():
     runner = Runner("push", 2, randomize={"size": (1.5, 1.5)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
-    cube = scene_view.items(runner, 1)[0]
-    np.testing.assert_allclose(cube.shape.half_extents, 0.03)
+    world = np.array([1])
+    cube = scene_view.items(runner, world)[0]
+    np.testing.assert_allclose(cube.size * np.array(cube.shape.half_extents), 0.03)
     runner = Runner("stack", 2, randomize={"size": (0.8, 1.2)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
-    cubes = scene_view.items(runner, 1)[:2]
+    cubes = scene_view.items(runner, world)[:2]
     ghosts = runner.task.markers(runner.world, 1, runner.goals[1])
     for cube, ghost in zip(cubes, ghosts, strict=True):
-        np.testing.assert_allclose(ghost.half_extents, cube.shape.half_extents)
+        np.testing.assert_allclose(ghost.half_extents, cube.size * cube.shape.half_extents)
 
 
 def test_observed_parameters_are_those_drawn_and_lie_in_the_space():

@@ -16,8 +16,8 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
 from physics import World
 from rigid_envs.rendering import scene_view
-from rigid_envs.rendering.renderer import Mark, grid
-from rigid_envs.rendering.view import BODY_COLORS
+from rigid_envs.rendering.renderer import grid
+from rigid_envs.rendering.view import BODY_COLORS, Mark
 from rigid_envs.tasks import Push, Stack, Throw, push
 from tests.rigid_envs.rollout import (
     IDS,
@@ -97,7 +97,7 @@ def test_a_window_opens_with_the_first_episode_and_closes_with_the_environment(m
 
 def test_a_window_shows_many_worlds_as_a_grid(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    envs = make_vec(3, render_mode="human", render_size=64)
+    envs = make_vec(3, render_mode="human", width=64, height=64)
     envs.reset(seed=0)
     assert envs.render() is None
     assert pygame.display.get_surface().get_size() == (128, 128)
@@ -129,7 +129,7 @@ def test_an_episode_of_one_world_can_be_filmed(env_id, tmp_path):
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_episodes_of_many_worlds_can_be_filmed(env_id, tmp_path):
-    envs = make_vec(4, env_id, render_mode="rgb_array", max_episode_steps=8, render_size=160)
+    envs = make_vec(4, env_id, render_mode="rgb_array", max_episode_steps=8, width=160, height=160)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         envs = RecordVectorVideo(
@@ -144,14 +144,16 @@ def test_episodes_of_many_worlds_can_be_filmed(env_id, tmp_path):
 
 
 def test_of_many_worlds_the_first_are_drawn():
-    envs = make_vec(40, render_mode="rgb_array", render_size=64, fidelity="fast")
+    envs = make_vec(40, render_mode="rgb_array", width=64, height=64, fidelity="fast")
     envs.reset(seed=0)
     with pytest.warns(UserWarning, match=r"draws 16 of 40 worlds; render_worlds=\.\.\. draws more"):
         assert len(envs.render()) == 16
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert len(envs.render()) == 16  # said once
-    more = make_vec(40, render_mode="rgb_array", render_size=16, render_worlds=20, fidelity="fast")
+    more = make_vec(
+        40, render_mode="rgb_array", width=16, height=16, render_worlds=20, fidelity="fast"
+    )
     more.reset(seed=0)
     with pytest.warns(UserWarning, match="draws 20 of 40"):
         assert len(more.render()) == 20
@@ -197,7 +199,8 @@ def test_the_camera_sees_the_whole_task(task):
 @pytest.mark.parametrize(
     ("task", "low", "high"),
     [
-        (Push(), push.LOW, push.HIGH),
+        # as high as where it starts; a picture of all that it can reach would be mostly floor
+        (Push(), push.LOW, (*push.HIGH[:2], push.HOME[2])),
         (Stack(), Stack.hand.low, Stack.hand.high),
         (Throw(), Throw.hand.low, Throw.hand.high),
     ],
@@ -235,9 +238,9 @@ def test_a_cross_shows_where_the_ball_landed_and_stays_there():
 def test_a_gripper_hangs_from_an_arm_that_follows_its_fingers():
     env = make("RigidEnvs/Stack-v0")
     env.reset(seed=0)
-    before = [item.position for item in scene_view.items(env._runner, 0)]
+    before = [item.position[0] for item in scene_view.items(env._runner, np.zeros(1, int))]
     env.step(np.array([0.0, 0.0, 1.0, 1.0]))
-    after = [item.position for item in scene_view.items(env._runner, 0)]
+    after = [item.position[0] for item in scene_view.items(env._runner, np.zeros(1, int))]
     assert len(after) == 2 + 2 + 4  # cubes, pads, and two fingers, a bar and a post
     rise = np.array(after)[2:, 2] - np.array(before)[2:, 2]
     assert rise.min() > 0.01
@@ -275,14 +278,13 @@ def test_an_environment_draws_without_a_banner_and_without_a_display():
     assert done.stdout == ""
 
 
-def test_pygame_is_imported_with_the_first_picture_only():
+def test_pictures_need_no_pygame():
     program = (
         "import sys\n"
         "import gymnasium as gym\n"
         f"env = gym.make('rigid_envs:{PUSH}', render_mode='rgb_array', fidelity='fast')\n"
         "env.reset(seed=0)\n"
-        "assert 'pygame' not in sys.modules\n"
         "env.render()\n"
-        "assert 'pygame' in sys.modules\n"
+        "assert 'pygame' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)

@@ -164,7 +164,7 @@ def down(key):
     return pygame.event.Event(pygame.KEYDOWN, key=key)
 
 
-SMALL = {"fidelity": "fast", "fps": 1000.0, "render_size": 64}
+SMALL = {"fidelity": "fast", "fps": 1000.0, "width": 64, "height": 64}
 
 
 def test_closing_the_window_ends_the_game(keyboard):
@@ -206,7 +206,7 @@ def test_command_passes_arguments_to_the_environment(keyboard, capsys):
     keyboard[1] = [down(pygame.K_ESCAPE)]
     words = ["play", STACK, "--blocks", "3", "--fidelity", "fast", "--seed", "1"]
     words += ["--reward", "dense", "--show-forces", "--show-particles"]
-    assert cli.main([*words, "--env-kwargs", "render_size:64"]) == 0
+    assert cli.main([*words, "--env-kwargs", "width:64", "height:64"]) == 0
     assert capsys.readouterr().err == ""
 
 

@@ -1,0 +1,189 @@
+"""Pixels as observations: small pictures of every world, stacked over the last steps."""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+
+from physics import Ground
+from physics.scene.validation import choice, integer
+from rigid_envs.rendering import scene_view
+from rigid_envs.rendering.cameras import choose_camera
+from rigid_envs.rendering.renderer import Frames, Renderer
+
+if TYPE_CHECKING:
+    from rigid_envs.episodes.runner import Runner
+
+Array = np.ndarray
+Observation = dict[str, Array]
+
+OBSERVATION_TYPES = ("state", "pixels", "pixels+state")
+CHANNELS = {"rgb": 3, "depth": 1, "segmentation": 1}
+"""How many bytes of a pixel each kind takes."""
+
+SIZE = 84  # pixels, the width and height that most learners from pixels use
+LEAST, MOST = 8, 1024  # pixels
+DEEPEST = 2.0  # depth of the brightest pixel, as a share of the camera's distance
+
+
+class PixelSettings(NamedTuple):
+    """What `obs_type` and the arguments beside it ask for.
+
+    Attributes:
+        keeps_state: whether the state is observed too.
+        kinds: of pixels, in the order of the channels.
+        width: pixels.
+        height: pixels.
+        frame_stack: how many steps a picture shows.
+        camera: a name, a Camera or its settings, see `choose_camera`.
+    """
+
+    keeps_state: bool
+    kinds: tuple[str, ...]
+    width: int
+    height: int
+    frame_stack: int
+    camera: Any
+
+
+def pixel_settings(
+    obs_type: str, pixels: Any, pixel_size: Any, frame_stack: int, camera: Any
+) -> PixelSettings | None:
+    """Checked settings; None if the state alone is observed.
+
+    Args:
+        obs_type: one of `OBSERVATION_TYPES`.
+        pixels: one of `CHANNELS`, or several.
+        pixel_size: width and height in pixels, or (width, height).
+        frame_stack: how many steps a picture shows.
+        camera: see `choose_camera`.
+
+    Raises:
+        TypeError, ValueError: an unknown name, or a number out of its range.
+    """
+    choice("obs_type", obs_type, OBSERVATION_TYPES)
+    kinds = _check_kinds(pixels)
+    size = pixel_size if isinstance(pixel_size, tuple | list) else (pixel_size, pixel_size)
+    if len(size) != 2:
+        raise ValueError(f"pixel_size must be a number or (width, height), got {pixel_size!r}")
+    width, height = (integer("pixel_size", n, low=LEAST, high=MOST) for n in size)
+    stack = integer("frame_stack", frame_stack, low=1, high=64)
+    if obs_type == "state":
+        if stack > 1:
+            raise ValueError(
+                f'frame_stack={stack} stacks pixels: it needs obs_type="pixels" or "pixels+state"'
+            )
+        return None
+    return PixelSettings(obs_type == "pixels+state", kinds, width, height, stack, camera)
+
+
+class Pixels:
+    """Pictures of a runner's worlds as observations.
+
+    The markers of goals are not drawn: goals stay numbers, so that learners that relabel them (HER)
+    see no picture that shows another goal. A world's pictures depend on its own episode alone.
+
+    - "rgb": three bytes.
+    - "depth": 0 at the eye, 255 at twice the camera's distance and beyond.
+    - "segmentation": 0 where there is nothing, else 1 + the index of the solid.
+
+    In a stack the last step's channels are last. At the start of an episode its first picture
+    stands for those before it.
+
+    Args:
+        runner: whose worlds.
+        settings: see `PixelSettings`.
+
+    Attributes:
+        space: of one world's pixels.
+    """
+
+    def __init__(self, runner: "Runner", settings: PixelSettings) -> None:
+        self._runner, self._kinds, self._stack = runner, settings.kinds, settings.frame_stack
+        width, height = settings.width, settings.height
+        camera = choose_camera(settings.camera, runner.task.camera)
+        self._renderer = Renderer(width, height, camera, threads=runner.world.threads)
+        self._channels = sum(CHANNELS[kind] for kind in self._kinds)
+        shape = (height, width, self._channels * self._stack)
+        self.space = spaces.Box(0, 255, shape, np.uint8)
+        self._frames = np.zeros((runner.count, *shape), np.uint8)
+        # of each world, whether its picture is old, and whether its episode has just started
+        self._old, self._starts = np.ones((2, runner.count), dtype=bool)
+        grounds = [
+            i for i, static in enumerate(runner.world.scene.statics) if isinstance(static, Ground)
+        ]
+        scene = runner.world.scene
+        self._ground = len(scene.bodies) + len(scene.driven_bodies) + grounds[0] if grounds else -1
+
+    def stepped(self) -> None:
+        """All worlds have moved."""
+        self._old[:] = True
+
+    def started(self, mask: Array) -> None:
+        """The worlds of a mask have started an episode."""
+        self._old |= mask
+        self._starts |= mask
+
+    def observe(self) -> Array:
+        """Pixels [count, height, width, channels]; draws only what has changed since the last."""
+        worlds = np.flatnonzero(self._old)
+        if len(worlds):
+            new, channels = self._draw(worlds), self._channels
+            if self._stack == 1:
+                self._frames[worlds] = new
+            else:
+                first = self._starts[worlds]
+                self._frames[worlds[first]] = np.tile(new[first], self._stack)
+                rest = worlds[~first]
+                self._frames[rest, ..., :-channels] = self._frames[rest, ..., channels:]
+                self._frames[rest, ..., -channels:] = new[~first]
+            self._old[:] = self._starts[:] = False
+        return self._frames.copy()
+
+    def get_state(self) -> dict[str, Array]:
+        """What later observations depend on beside the worlds."""
+        return {
+            "frames": self._frames.copy(),
+            "old": self._old.copy(),
+            "starts": self._starts.copy(),
+        }
+
+    def set_state(self, state: dict[str, Array]) -> None:
+        """Restores `get_state`."""
+        self._frames[:], self._old[:] = state["frames"], state["old"]
+        self._starts[:] = state["starts"]
+
+    def _draw(self, worlds: Array) -> Array:
+        frames = self._renderer.frames(
+            scene_view.items(self._runner, worlds),
+            worlds=len(worlds),
+            rgb="rgb" in self._kinds,
+            depth="depth" in self._kinds,
+            solid="segmentation" in self._kinds,
+            ground_solid=self._ground,
+        )
+        if self._kinds == ("rgb",):
+            assert frames.rgb is not None
+            return frames.rgb
+        return np.concatenate([self._channel(kind, frames) for kind in self._kinds], axis=-1)
+
+    def _channel(self, kind: str, frames: Frames) -> Array:
+        if kind == "rgb":
+            assert frames.rgb is not None
+            return frames.rgb
+        if kind == "depth":
+            assert frames.depth is not None
+            share = frames.depth / (DEEPEST * self._renderer.camera.distance)
+            return np.asarray(255.0 * np.minimum(share, 1.0)).astype(np.uint8)[..., None]
+        assert frames.solid is not None
+        return (frames.solid + 1).astype(np.uint8)[..., None]
+
+
+def _check_kinds(kinds: Any) -> tuple[str, ...]:
+    """Kinds of pixels: one name, or several of them, none twice."""
+    names = (kinds,) if isinstance(kinds, str) else tuple(kinds)
+    for name in names:
+        choice("pixels", name, CHANNELS)
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"pixels must name at least one kind, and none twice, got {kinds!r}")
+    return names

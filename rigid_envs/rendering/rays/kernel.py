@@ -1,0 +1,85 @@
+"""The entry of the renderer: pictures of many worlds, one after another."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
+from physics.compiler.code_cache import hash_sources
+from physics.compiler.jit import large_entry
+from rigid_envs.rendering.rays.light import find_shadows
+from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
+from rigid_envs.rendering.rays.shading import paint, smooth
+from rigid_envs.rendering.rays.visibility import find_nearest
+
+SOURCES = hash_sources(Path(__file__).parent)
+
+
+@cache
+def make_draw() -> Any:
+    """Entry point: draws the worlds first <= w < last.
+
+    Args:
+        first, last: worlds.
+        primitives: [worlds, n], of PRIMITIVE: the solids.
+        glass: [worlds, g], of PRIMITIVE: what is see-through, far ones first.
+        decals: [worlds, d], of DECAL.
+        polygons: [worlds, p], of POLYGON.
+        camera: [1], of CAMERA.
+        sun: [3], unit vector.
+        points: [samples, 3], directions to points of the sun; none: no shadows.
+        tiles: [rows, columns, 3], picture of the empty ground.
+        tile_depth: [rows, columns] m, its depth; infinite above the horizon.
+        smooths: whether borders are smoothed.
+        depth, shown, hidden, ground, around: working memory: [rows, columns] of numbers, integers
+            and bytes, [rows, columns, 3] bytes, [9, 2] integers.
+        rgb: [worlds, rows, columns, 3] bytes, is written.
+        depths: [worlds, rows, columns] m, is written; of no worlds if it isn't wanted.
+        solids: [worlds, rows, columns], the solids that are seen; likewise.
+        ground_solid: which solid the ground is, -1 if none.
+    """
+    sources, engine = SOURCES, ENGINE_SOURCES
+
+    @large_entry
+    def draw(
+        first, last, primitives, glass, decals, polygons, camera, sun, points, tiles, tile_depth,
+        smooths, depth, shown, hidden, ground, around, rgb, depths, solids, ground_solid,
+    ):  # fmt: skip
+        _ = sources, engine
+        rows, columns = depth.shape
+        view, samples = camera[0], len(points)
+        for w in range(first, last):
+            for row in range(rows):
+                for column in range(columns):
+                    depth[row, column] = tile_depth[row, column]
+                    shown[row, column] = -1
+                    hidden[row, column] = 0
+            bounds = find_nearest(primitives[w], view, depth, shown)
+            if rgb.shape[0] > 0:
+                if samples > 0:
+                    find_shadows(primitives[w], view, sun, points, depth, shown, hidden)
+                for row in range(rows):
+                    for column in range(columns):
+                        for k in range(3):
+                            ground[row, column, k] = tiles[row, column, k]
+                draw_decals(decals[w], view, ground)
+                paint(primitives[w], view, sun, samples, shown, hidden, ground, rgb[w])
+                if smooths:
+                    smooth(
+                        primitives[w], view, sun, samples, shown, hidden, ground, around, bounds,
+                        rgb[w],
+                    )  # fmt: skip
+                draw_glass(glass[w], view, sun, depth, rgb[w])
+                draw_polygons(polygons[w], rgb[w])
+            for row in range(rows):
+                for column in range(columns):
+                    if depths.shape[0] > 0:
+                        depths[w, row, column] = depth[row, column]
+                    if solids.shape[0] > 0:
+                        n = shown[row, column]
+                        solid = primitives[w, n].solid if n >= 0 else -1
+                        if (n < 0) & (tile_depth[row, column] < 1e300):
+                            solid = ground_solid
+                        solids[w, row, column] = solid
+
+    return draw

@@ -1,0 +1,124 @@
+"""What is drawn beside solids: decals on the ground, see-through shapes, polygons over all."""
+
+import math
+
+from physics.compiler.jit import stage
+from rigid_envs.rendering.rays.intersections import SPHERE, intersection
+from rigid_envs.rendering.rays.light import brightness
+from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
+
+RIM = 0.55  # opacity that a see-through ball has at its rim, beside its own
+LOOKS = 4  # per pixel and direction at the border of a decal
+
+
+@stage
+def draw_decals(decals, camera, ground):
+    """Discs and crosses on a picture [rows, columns, 3] of the ground."""
+    rows, columns, _ = ground.shape
+    for n in range(len(decals)):
+        d = decals[n]
+        x, y = d.position[0], d.position[1]
+        top, bottom, left, right = bounds(camera, x, y, 0.0, d.radius, rows, columns)
+        for row in range(top, bottom):
+            for column in range(left, right):
+                opacity = 0.0
+                for look in range(LOOKS * LOOKS):
+                    down, across = look // LOOKS, look % LOOKS
+                    dx, dy, dz = sight(
+                        camera, row + (down + 0.5) / LOOKS, column + (across + 0.5) / LOOKS
+                    )
+                    if dz < 0.0:
+                        t = -camera.eye[2] / dz
+                        opacity += _opacity(
+                            d, camera.eye[0] + t * dx - x, camera.eye[1] + t * dy - y,
+                            t * camera.pixel,
+                        )  # fmt: skip
+                blend(ground, row, column, d.color, 1.0, 0.0, opacity / (LOOKS * LOOKS))
+
+
+@stage
+def _opacity(d, x, y, pixel):
+    """Of a decal at a point of the ground, from its middle in m."""
+    if d.width > 0.0:  # a cross, whose arms are diagonals
+        u, v = abs(x + y) * math.sqrt(0.5), abs(x - y) * math.sqrt(0.5)
+        return d.opacity if (max(u, v) <= d.radius) & (min(u, v) <= d.width) else 0.0
+    r = math.sqrt(x * x + y * y)
+    return 0.0 if r > d.radius else (d.rim if r > d.radius - 1.5 * pixel else d.opacity)
+
+
+@stage
+def blend(picture, row, column, color, diffuse, shine, opacity):
+    """Mixes a lit colour into a pixel."""
+    for k in range(3):
+        value = min(max(color[k] * diffuse + shine, 0.0), 255.0)
+        picture[row, column, k] += opacity * (value - picture[row, column, k])
+
+
+@stage
+def draw_glass(glass, camera, sun, depth, rgb):
+    """See-through shapes in front of what is seen, in the order of the table: far ones first."""
+    rows, columns = depth.shape
+    for n in range(len(glass)):
+        p = glass[n]
+        top, bottom, left, right = bounds(
+            camera, p.position[0], p.position[1], p.position[2], p.reach, rows, columns
+        )
+        ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
+        for row in range(top, bottom):
+            for column in range(left, right):
+                cover, diffuse, shine, facing = 0.0, 0.0, 0.0, 0.0
+                for look in range(4):
+                    dx, dy, dz = sight(
+                        camera, row + 0.25 + 0.5 * (look // 2), column + 0.25 + 0.5 * (look % 2)
+                    )
+                    ex, ey, ez = turned_into(p, dx, dy, dz)
+                    t, lx, ly, lz = intersection(
+                        p.kind, p.size[0], p.size[1], p.size[2], ox, oy, oz, ex, ey, ez
+                    )
+                    if (t < depth[row, column]) & (t > camera.near):
+                        A = p.axes
+                        nx = A[0, 0] * lx + A[1, 0] * ly + A[2, 0] * lz
+                        ny = A[0, 1] * lx + A[1, 1] * ly + A[2, 1] * lz
+                        nz = A[0, 2] * lx + A[1, 2] * ly + A[2, 2] * lz
+                        d, s = brightness(nx, ny, nz, dx, dy, dz, sun, 1.0, p.gloss)
+                        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+                        cover, diffuse, shine = cover + 0.25, diffuse + d, shine + s
+                        facing += abs(nx * dx + ny * dy + nz * dz) / length
+                if cover > 0.0:
+                    k = 0.25 / cover
+                    opacity = p.opacity
+                    if p.kind == SPHERE:
+                        opacity = min(opacity + RIM * (1.0 - k * facing) ** 2, 1.0)
+                    blend(rgb, row, column, p.color, k * diffuse, k * shine, cover * opacity)
+
+
+@stage
+def draw_polygons(polygons, rgb):
+    """Convex polygons with smooth borders."""
+    rows, columns, _ = rgb.shape
+    for n in range(len(polygons)):
+        p = polygons[n]
+        q = p.corners
+        low_x, high_x, low_y, high_y = q[0, 0], q[0, 0], q[0, 1], q[0, 1]
+        area = 0.0
+        for k in range(4):
+            m = (k + 1) % 4
+            low_x, high_x = min(low_x, q[k, 0]), max(high_x, q[k, 0])
+            low_y, high_y = min(low_y, q[k, 1]), max(high_y, q[k, 1])
+            area += q[k, 0] * q[m, 1] - q[m, 0] * q[k, 1]
+        if not ((low_x > -1e6) & (high_x < 1e6) & (low_y > -1e6) & (high_y < 1e6)):
+            continue
+        side = 1.0 if area > 0.0 else -1.0
+        for row in range(max(math.floor(low_y) - 1, 0), min(math.ceil(high_y) + 1, rows)):
+            for column in range(max(math.floor(low_x) - 1, 0), min(math.ceil(high_x) + 1, columns)):
+                x, y, inside = column + 0.5, row + 0.5, 1e9
+                for k in range(4):
+                    m = (k + 1) % 4
+                    ux, uy = q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]
+                    length = math.sqrt(ux * ux + uy * uy)
+                    if length > 1e-9:
+                        gap = side * (ux * (y - q[k, 1]) - uy * (x - q[k, 0])) / length
+                        inside = min(inside, gap)
+                cover = min(max(inside + 0.5, 0.0), 1.0)
+                if cover > 0.0:
+                    blend(rgb, row, column, p.color, 1.0, 0.0, cover * p.opacity)

@@ -1,0 +1,113 @@
+"""Which primitive each pixel shows, and at what depth."""
+
+import math
+
+from physics.compiler.jit import stage
+from rigid_envs.rendering.rays.intersections import intersection
+
+
+@stage
+def bounds(camera, x, y, z, radius, rows, columns):
+    """First and last row and column (exclusive) of the pixels that a sphere may cover."""
+    px, py, pz = x - camera.eye[0], y - camera.eye[1], z - camera.eye[2]
+    axes = camera.axes
+    right = px * axes[0, 0] + py * axes[0, 1] + pz * axes[0, 2]
+    up = px * axes[1, 0] + py * axes[1, 1] + pz * axes[1, 2]
+    depth = px * axes[2, 0] + py * axes[2, 1] + pz * axes[2, 2]
+    if depth <= -radius:
+        return 0, 0, 0, 0
+    square = depth * depth - radius * radius
+    if (depth <= radius) | (square <= 1e-6 * depth * depth):
+        return 0, rows, 0, columns
+    # tangents from the eye, in the plane of forward and right, and of forward and up
+    k = camera.focal / square
+    across, along = radius * math.sqrt(right * right + square), radius * math.sqrt(up * up + square)
+    limit = 1e6  # far outside, and an integer for sure
+    left = min(max(camera.half_width + k * (right * depth - across), -limit), limit)
+    end = min(max(camera.half_width + k * (right * depth + across), -limit), limit)
+    top = min(max(camera.half_height - k * (up * depth + along), -limit), limit)
+    bottom = min(max(camera.half_height - k * (up * depth - along), -limit), limit)
+    return (
+        max(math.floor(top), 0), min(math.ceil(bottom), rows),
+        max(math.floor(left), 0), min(math.ceil(end), columns),
+    )  # fmt: skip
+
+
+@stage
+def seen_from(primitive, x, y, z):
+    """A point of the world in a primitive's frame."""
+    p, A = primitive.position, primitive.axes
+    x, y, z = x - p[0], y - p[1], z - p[2]
+    return (
+        A[0, 0] * x + A[0, 1] * y + A[0, 2] * z,
+        A[1, 0] * x + A[1, 1] * y + A[1, 2] * z,
+        A[2, 0] * x + A[2, 1] * y + A[2, 2] * z,
+    )
+
+
+@stage
+def turned_into(primitive, x, y, z):
+    """A direction of the world in a primitive's frame."""
+    A = primitive.axes
+    return (
+        A[0, 0] * x + A[0, 1] * y + A[0, 2] * z,
+        A[1, 0] * x + A[1, 1] * y + A[1, 2] * z,
+        A[2, 0] * x + A[2, 1] * y + A[2, 2] * z,
+    )
+
+
+@stage
+def sight(camera, row, column):
+    """The direction in which a point of the picture is seen; a unit of it is a unit of depth."""
+    x = (column - camera.half_width) * camera.pixel
+    y = (camera.half_height - row) * camera.pixel
+    A = camera.axes
+    return (
+        A[2, 0] + x * A[0, 0] + y * A[1, 0],
+        A[2, 1] + x * A[0, 1] + y * A[1, 1],
+        A[2, 2] + x * A[0, 2] + y * A[1, 2],
+    )
+
+
+@stage
+def find_nearest(primitives, camera, depth, shown):
+    """The nearest primitive of every pixel.
+
+    Args:
+        primitives: [n], of PRIMITIVE.
+        camera: a record of CAMERA.
+        depth: [rows, columns] m; at first that of the ground, infinite above the horizon.
+        shown: [rows, columns], at first -1: the ground, or nothing.
+
+    Returns:
+        First and last row and column (exclusive) of what was changed.
+    """
+    rows, columns = depth.shape
+    first_row, last_row, first_column, last_column = rows, 0, columns, 0
+    A = camera.axes
+    for n in range(len(primitives)):
+        p = primitives[n]
+        top, bottom, left, right = bounds(
+            camera, p.position[0], p.position[1], p.position[2], p.reach, rows, columns
+        )
+        if (top >= bottom) | (left >= right):
+            continue
+        first_row, last_row = min(first_row, top), max(last_row, bottom)
+        first_column, last_column = min(first_column, left), max(last_column, right)
+        kind, a, b, c = p.kind, p.size[0], p.size[1], p.size[2]
+        ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
+        rx, ry, rz = turned_into(p, A[0, 0], A[0, 1], A[0, 2])
+        ux, uy, uz = turned_into(p, A[1, 0], A[1, 1], A[1, 2])
+        fx, fy, fz = turned_into(p, A[2, 0], A[2, 1], A[2, 2])
+        for row in range(top, bottom):
+            y = (camera.half_height - row - 0.5) * camera.pixel
+            lx, ly, lz = fx + y * ux, fy + y * uy, fz + y * uz
+            for column in range(left, right):
+                x = (column + 0.5 - camera.half_width) * camera.pixel
+                t, _, _, _ = intersection(
+                    kind, a, b, c, ox, oy, oz, lx + x * rx, ly + x * ry, lz + x * rz
+                )
+                if (t < depth[row, column]) & (t > camera.near):
+                    depth[row, column] = t
+                    shown[row, column] = n
+    return first_row, last_row, first_column, last_column
