@@ -17,6 +17,7 @@ from benchmarks.measure import (
     features,
     flags,
     memory,
+    pixels,
     presets,
     rendering,
     speed,
@@ -36,6 +37,7 @@ MODULES = {
     "startup": startup,
     "memory": memory,
     "rendering": rendering,
+    "pixels": pixels,
     "accuracy": accuracy,
     "consistency": consistency,
     "features": features,
@@ -62,7 +64,7 @@ def run() -> None:
     benchmarks: dict[str, Callable[[], Iterator[Table]]] = {
         name: module.measure for name, module in MODULES.items()
     }
-    for name, module in (("speed", speed), ("worlds", worlds)):
+    for name, module in (("speed", speed), ("worlds", worlds), ("pixels", pixels)):
         benchmarks[name] = partial(module.measure, options.panda)
 
     this_run, tables = provenance(), []

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.draw import env_steps, tasks, trade
+from benchmarks.draw import env_steps, scenes, tasks, trade
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.results_file import load
 from benchmarks.report.tables import Table
@@ -34,6 +34,7 @@ PLOTS = {
 }
 # the animation of all tasks, and frames of an episode of each
 FILM = ROOT / "docs/images/tasks.gif"
+SCENES = ROOT / "docs/images/scenes.png"
 # plots of docs/trade/trade.csv: their trials
 TRADE = {
     ROOT / "docs/images/trade.png": (
@@ -48,7 +49,7 @@ TRADE = {
 
 def run() -> None:
     """Draws all pictures, or those named."""
-    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS]
+    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS, "scenes"]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
     options = parser.parse_args()
@@ -58,6 +59,8 @@ def run() -> None:
     for name in options.names or names:
         if name == "tasks":
             tasks.draw_film(path := FILM)
+        elif name == "scenes":
+            scenes.draw(path := SCENES)
         elif name in tasks.STRIPS:
             tasks.draw_strip(name, path := ROOT / f"docs/images/{name}.png")
         elif name == "trade":

@@ -13,6 +13,7 @@ from PIL import Image
 
 from benchmarks.report.provenance import ROOT
 from training.policies.policy_file import read_policy
+from training.results.gif import GifWriter
 from training.scripted import controller_for
 from training.settings.environments import make_single_env
 
@@ -44,9 +45,9 @@ STRIPS = {
 }
 SIZE = 360  # pixels of a strip's frame
 
-# the animation: how many steps are shown of each task's episodes, of which every second is drawn
-FILM_STEPS, FILM_LENGTH, EVERY = {"Push": 24, "Stack": 48, "Throw": 24}, 96, 2
-FILM_SIZE, FILM_FPS, COLORS = 300, 12.5, 128
+# the animation: how many steps are shown of each task's episodes
+FILM_STEPS, FILM_LENGTH = {"Push": 24, "Stack": 48, "Throw": 24}, 96
+FILM_SIZE, FILM_FPS = 300, 25.0
 
 
 def draw_strip(name: str, path: Path) -> None:
@@ -67,23 +68,16 @@ def draw_film(path: Path) -> None:
         [
             frame
             for k in range(FILM_LENGTH // steps)
-            for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1::EVERY]
+            for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1:]
         ]
         for task, steps in FILM_STEPS.items()
     ]
     gap = np.full((FILM_SIZE, GAP, 3), 255, np.uint8)
-    frames = [
-        Image.fromarray(np.concatenate([left, gap, middle, gap, right], axis=1))
-        for left, middle, right in zip(*columns, strict=True)
-    ]
-    # one palette for all frames, so that what stands still doesn't flicker
-    palette = _palette(frames[::4], COLORS)
-    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     path.parent.mkdir(parents=True, exist_ok=True)
-    flat[0].save(
-        path, save_all=True, append_images=flat[1:], duration=round(1000 / FILM_FPS), loop=0,
-        optimize=False,
-    )  # fmt: skip
+    writer = GifWriter(path, FILM_FPS, 3 * (FILM_SIZE + GAP))
+    for left, middle, right in zip(*columns, strict=True):
+        writer.append_data(np.concatenate([left, gap, middle, gap, right], axis=1))
+    writer.close()
 
 
 def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:
@@ -98,15 +92,6 @@ def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> It
             action = np.asarray(act(batch))[0].astype(env.action_space.dtype)
             observation = env.step(action)[0]
             yield np.asarray(env.render())
-
-
-def _palette(pictures: list[Image.Image], colors: int) -> Image.Image:
-    """Colours for all pictures, in which those of small solids have places beside the ground's."""
-    pixels = np.concatenate([np.asarray(picture).reshape(-1, 3) for picture in pictures])
-    kinds, counts = np.unique(pixels >> 2, axis=0, return_counts=True)
-    often = np.ceil(counts**0.25).astype(int)
-    rows = np.repeat((kinds << 2) + 2, often, axis=0).astype(np.uint8)
-    return Image.fromarray(rows[None]).quantize(colors)
 
 
 def _player(

@@ -122,7 +122,8 @@ class Runner:
             "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
             "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
         }
-        self._pixels, self._keeps_state = None, pixels is not None and pixels.keeps_state
+        self._keeps_state = pixels is not None and pixels.keeps_state
+        self._pixels: Pixels | None = None
         if pixels is not None:
             self._pixels = Pixels(self, pixels)
             if self._keeps_state:
@@ -256,6 +257,11 @@ class Runner:
             time=old.time,
         )
         self.world, self._now = new, new.read()
+
+    @property
+    def pixels(self) -> Pixels | None:
+        """What draws the observed pixels, if any are."""
+        return self._pixels
 
     @property
     def seeded(self) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 
 from rigid_envs.rendering.camera import Camera
 
@@ -43,3 +44,25 @@ def choose_camera(given: Any, own: Camera) -> Camera:
     if unknown := [name for name in given if name not in FIELDS]:
         raise ValueError(f"camera has no field {unknown[0]!r}: its fields are {', '.join(FIELDS)}")
     return Camera(**{name: getattr(own, name) for name in FIELDS} | dict(given))
+
+
+def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0) -> Camera:
+    """A camera that sees a box, from as near as it can.
+
+    Args:
+        low: (3,) m, least coordinates.
+        high: (3,) m, greatest coordinates.
+        azimuth: degrees, see `Camera.around`.
+        elevation: degrees, likewise.
+    """
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    corners = low + (high - low) * np.array(
+        [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    )
+    target = tuple((0.5 * (low + high)).tolist())
+    # how far each corner is from the target across the picture and into it
+    unit = Camera.around(target, 1.0, azimuth, elevation)
+    local = (corners - target) @ unit.axes.T
+    slope = np.tan(0.5 * np.radians(unit.field_of_view))
+    needed = np.abs(local[:, :2]).max(axis=1) / slope - local[:, 2]
+    return Camera.around(target, float(needed.max()), azimuth, elevation)

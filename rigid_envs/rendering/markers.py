@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.rays.intersections import BOX, CAPSULE
 from rigid_envs.rendering.primitives import balls, primitives
+from rigid_envs.rendering.rays.intersections import BOX, CAPSULE
 from rigid_envs.rendering.rays.tables import DECAL, POLYGON, PRIMITIVE
 from rigid_envs.rendering.view import Arrow, Color, Ghost, Goal, Mark, Marker
 

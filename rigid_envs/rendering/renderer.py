@@ -15,10 +15,11 @@ from physics.scene.validation import integer
 from physics.step.threads import run_in_blocks
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.ground import ground
-from rigid_envs.rendering.rays.kernel import make_draw
-from rigid_envs.rendering.rays.light import TO_SUN, sun_points
 from rigid_envs.rendering.markers import Overlay, overlay, stacked
 from rigid_envs.rendering.primitives import balls, placed, shape_primitives
+from rigid_envs.rendering.rays.kernel import make_draw
+from rigid_envs.rendering.rays.light import SUN_FRAME, TO_SUN, sun_points
+from rigid_envs.rendering.rays.shadows import MOST_CELLS
 from rigid_envs.rendering.rays.tables import PRIMITIVE
 from rigid_envs.rendering.view import Arrow, Item, Marker
 
@@ -26,6 +27,7 @@ Array = np.ndarray
 
 LARGEST = 4096  # pixels, width or height
 SOFT = 8  # points of the sun for soft shadows
+LISTED = 16  # places in the lists of the shadows' grid for each primitive
 _FAINT = 0.24  # opacity of a shape around its particles
 _LEAST_BALL = 1.0  # pixels, radius; smaller particles would not be seen
 
@@ -52,7 +54,8 @@ class Renderer:
         width: pixels, 1 to 4096.
         height: pixels, 1 to 4096.
         camera: where to look from; by default a square of 30 cm about the origin fills the picture.
-        fine: smooth borders and soft shadows.
+        smooth: whether borders are smoothed.
+        soft: whether shadows are, which takes longer where many solids hang high.
         threads: largest number of threads for pictures of many worlds.
 
     Raises:
@@ -65,20 +68,21 @@ class Renderer:
         height: int = 480,
         camera: Camera | None = None,
         *,
-        fine: bool = True,
+        smooth: bool = True,
+        soft: bool = True,
         threads: int = 1,
     ) -> None:
         self.width = integer("width", width, low=1, high=LARGEST)
         self.height = integer("height", height, low=1, high=LARGEST)
-        self.camera, self.fine = camera or Camera(), fine
+        self.camera, self.smooth, self.soft = camera or Camera(), smooth, soft
         self.threads = integer("threads", threads, low=1)
-        self._points = sun_points(SOFT if fine else 1)
+        self._points = sun_points(SOFT if soft else 1)
         self._view = self.camera.table(self.width, self.height)
         self._memory = threading.local()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Settings only."""
-        settings = (self.width, self.height, self.camera, self.fine, self.threads)
+        settings = (self.width, self.height, self.camera, self.smooth, self.soft, self.threads)
         return _renderer, settings
 
     def frame(
@@ -105,6 +109,7 @@ class Renderer:
         overlays: Sequence[Overlay] = (),
         *,
         worlds: int = 1,
+        primitives: Array | None = None,
         rgb: bool = True,
         depth: bool = False,
         solid: bool = False,
@@ -116,6 +121,7 @@ class Renderer:
             items: the solids.
             overlays: what else is drawn in each world; none, or one for each.
             worlds: how many.
+            primitives: [worlds, n], of PRIMITIVE: solids beside the items.
             rgb: whether colours are wanted.
             depth: whether depths are wanted.
             solid: whether the indices of the solids that are seen are wanted.
@@ -123,6 +129,8 @@ class Renderer:
         """
         size = (self.height, self.width)
         solids, faint = self._tables(items, worlds)
+        if primitives is not None:
+            solids = np.concatenate([solids, primitives], axis=1)
         glass, decals, polygons = stacked(overlays, worlds)
         glass = np.concatenate([faint, glass], axis=1)
         colors = np.empty((worlds if rgb else 0, *size, 3), np.uint8)
@@ -131,11 +139,13 @@ class Renderer:
         tiles, tile_depth = ground(self.camera, self.width, self.height)
         kernel = make_draw()
 
+        order = np.argsort(-(solids["position"] @ TO_SUN), axis=1, kind="stable")
+
         def run(first: int, last: int) -> int:
             kernel(
-                first, last, solids, glass, decals, polygons, self._view, TO_SUN, self._points,
-                tiles, tile_depth, self.fine, *self._working_memory(), colors, depths, indices,
-                ground_solid,
+                first, last, solids, order, glass, decals, polygons, self._view, SUN_FRAME,
+                self._points, tiles, tile_depth, self.smooth,
+                *self._working_memory(solids.shape[1]), colors, depths, indices, ground_solid,
             )  # fmt: skip
             return 0
 
@@ -154,7 +164,8 @@ class Renderer:
             shape = placed(shape_primitives(item.shape), place, turn, size)
             shape["color"], shape["solid"] = item.color, item.solid
             if item.particles is None:
-                solids.append(shape)
+                shape["opacity"] = item.opacity
+                (solids if item.opacity == 1.0 else faint).append(shape)
                 continue
             shape["opacity"] = _FAINT
             faint.append(shape)
@@ -169,20 +180,25 @@ class Renderer:
             solids.append(samples)
         return np.concatenate(solids, axis=1), np.concatenate(faint, axis=1)
 
-    def _working_memory(self) -> tuple[Array, ...]:
-        """Of this thread."""
-        if not hasattr(self._memory, "arrays"):
-            size = (self.height, self.width)
-            self._memory.arrays = (
+    def _working_memory(self, count: int) -> tuple[Array, ...]:
+        """Of this thread, for `count` primitives."""
+        memory, size, listed = self._memory, (self.height, self.width), LISTED * count + 64
+        if not hasattr(memory, "pixels"):
+            memory.pixels = (
                 np.empty(size), np.empty(size, np.int32), np.empty(size, np.uint8),
                 np.empty((*size, 3), np.uint8), np.empty((9, 2), np.int64),
+                np.empty(MOST_CELLS**2 + 1, np.int32),
             )  # fmt: skip
-        arrays: tuple[Array, ...] = self._memory.arrays
-        return arrays
+            memory.entries = np.empty(0, np.int32)
+        if len(memory.entries) < listed:
+            memory.entries = np.empty(listed, np.int32)
+        return *memory.pixels, memory.entries
 
 
-def _renderer(width: int, height: int, camera: Camera, fine: bool, threads: int) -> Renderer:
-    return Renderer(width, height, camera, fine=fine, threads=threads)
+def _renderer(
+    width: int, height: int, camera: Camera, smooth: bool, soft: bool, threads: int
+) -> Renderer:
+    return Renderer(width, height, camera, smooth=smooth, soft=soft, threads=threads)
 
 
 def grid(frames: Sequence[Array], columns: int | None = None) -> Array:

@@ -35,6 +35,7 @@ class Item:
         particles: drawn in a faint shape if given.
         solid: its index in the scene, -1 if it is none of its solids.
         size: by which it is larger than its shape, or [worlds].
+        opacity: 0 to 1; a solid that is not opaque casts no shadow.
 
     Raises:
         ValueError: a position that is not three finite numbers, or a quaternion of zero length.
@@ -47,6 +48,7 @@ class Item:
     particles: Particles | None = None
     solid: int = -1
     size: float | Array = 1.0
+    opacity: float = 1.0
 
     def __post_init__(self) -> None:
         """Checks the pose and makes quaternions of unit length; tables of many are taken as is."""

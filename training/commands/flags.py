@@ -90,6 +90,11 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, help="of what is random in the scene (default: 0)")
     parser.add_argument("--threads", type=count, help="(default: all cores)")
+    parser.add_argument("--video", type=Path, metavar="FILE", help="mp4 or GIF to write")
+    parser.add_argument(
+        "--size", type=count, default=480,
+        help="width and height of the video in pixels (default: %(default)s)",
+    )  # fmt: skip
 
 
 def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:

@@ -170,8 +170,9 @@ def scene(options: argparse.Namespace) -> int:
     from training.commands import scene as scenes
 
     made = scenes.run(
-        options.scene, options.bodies, options.seconds, options.seed or 0, options.threads
-    )
+        options.scene, options.bodies, options.seconds, options.seed or 0, options.threads,
+        options.video, options.size,
+    )  # fmt: skip
     return INTERRUPTED if made.interrupted else 0
 
 

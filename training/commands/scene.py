@@ -3,7 +3,8 @@
 import math
 import sys
 import time
-from typing import NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,14 @@ from physics.reference.many_bodies import SCENES
 from physics.world import World
 from training.settings.errors import UsageError
 
+if TYPE_CHECKING:
+    from training.results.film import Film
+
 # of a body, in the scene and in the engine, at least
 _LEAST_BYTES = 1500
-# s of simulated time between two lines of the counter
+# pixels, width and height of a frame
+SIZE = 480
+# s of simulated time between two lines of the counter, and between two frames of a video
 _SHOWN_EVERY = 0.04
 
 
@@ -40,11 +46,29 @@ class SceneRun(NamedTuple):
     interrupted: bool
 
 
-def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) -> SceneRun:
+def run(
+    name: str,
+    bodies: int,
+    seconds: float,
+    seed: int,
+    threads: int | None,
+    video: Path | None = None,
+    size: int = SIZE,
+) -> SceneRun:
     """Runs a scene and prints its progress; Ctrl-C ends it with what was made so far.
 
+    Args:
+        name: of the scene.
+        bodies: how many.
+        seconds: s of simulated time.
+        seed: of what is random in it.
+        threads: all cores if None.
+        video: the mp4 or GIF to write, 25 frames for each simulated second; none if None.
+        size: width and height of a frame of an mp4 in pixels.
+
     Raises:
-        UsageError: no such scene, or more bodies than memory can hold.
+        UsageError: no such scene, more bodies than memory can hold, or a video that can't be
+            written.
     """
     if name not in SCENES:
         raise UsageError(f"unknown scene {name!r}: choose one of {', '.join(SCENES)}")
@@ -62,6 +86,7 @@ def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) 
     )
     substeps = max(1, round(_SHOWN_EVERY / fidelity.substep))
     frame, steps, wall, interrupted = substeps * fidelity.substep, 0, 0.0, False
+    film = _film(world, video, size, 1.0 / frame)
     try:
         world.advance(fidelity.substep)  # compiles the kernels
         steps = 1
@@ -71,9 +96,14 @@ def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) 
             world.advance(span)
             wall += time.perf_counter() - start
             steps += math.ceil(span / fidelity.substep * (1.0 - 1e-12))
+            if film is not None:
+                film.add()
             _show(world, steps, wall, seconds)
     except KeyboardInterrupt:
         interrupted = True
+    finally:
+        if film is not None:
+            film.close()
     kinetic = float(world.kinetic_energy()[0])
     energy = kinetic + float(world.potential_energy()[0])
     made = SceneRun(
@@ -81,7 +111,18 @@ def run(name: str, bodies: int, seconds: float, seed: int, threads: int | None) 
         interrupted,
     )  # fmt: skip
     _summarise(made, count)
+    if film is not None:
+        print(f"video       {film.path}, {film.count} frames, {film.rate:.1f} drawn a second")
     return made
+
+
+def _film(world: World, video: Path | None, size: int, fps: float) -> "Film | None":
+    """The video, whose writers are imported only if one is asked for."""
+    if video is None:
+        return None
+    from training.results.film import Film
+
+    return Film(world, video, fps, size)
 
 
 def _show(world: World, steps: int, wall: float, seconds: float) -> None:

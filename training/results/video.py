@@ -1,6 +1,5 @@
 """Records a video of a policy: an mp4 or a GIF, and a still image. Needs no display."""
 
-import os
 import sys
 from contextlib import closing
 from pathlib import Path
@@ -50,16 +49,12 @@ def record(
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
-    if video.suffix not in SUFFIXES:
-        raise UsageError(f"video is {str(video)!r}, should end in {' or '.join(SUFFIXES)}")
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     arguments = {**policy.env_kwargs, **env_kwargs, "render_mode": "rgb_array"}
     env = make_single_env(policy.env_id, **arguments)
-    video.parent.mkdir(parents=True, exist_ok=True)
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())
-    with _writer(video, fps, gif_width) as writer, closing(env):
+    with closing(env), video_writer(video, fps, gif_width) as writer:
         for episode in track(range(episodes), "recording", transient=True, console=console):
             frames = _render_episode(env, policy, seed + episode)
             if episode == 0:
@@ -69,7 +64,22 @@ def record(
     return video, still
 
 
-def _writer(video: Path, fps: float, gif_width: int) -> Any:
+def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:
+    """Takes frames by `append_data` and writes them when it is closed.
+
+    Raises:
+        UsageError: not an mp4 or a GIF, or it can't be written.
+    """
+    if video.suffix not in SUFFIXES:
+        raise UsageError(f"video is {str(video)!r}, should end in {' or '.join(SUFFIXES)}")
+    try:
+        video.parent.mkdir(parents=True, exist_ok=True)
+        existed = video.exists()
+        video.open("ab").close()
+        if not existed:  # a failure until it is written leaves nothing behind
+            video.unlink()
+    except OSError as error:
+        raise UsageError(f"cannot write {str(video)!r}: {error.strerror}") from None
     if video.suffix == ".gif":
         return GifWriter(video, fps, gif_width)
     # the codec requires even sizes: blocks of 2 keep the size of the frames, the default scales it

@@ -7,9 +7,9 @@ from typing import Any
 from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
 from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import large_entry
-from rigid_envs.rendering.rays.light import find_shadows
 from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
 from rigid_envs.rendering.rays.shading import paint, smooth
+from rigid_envs.rendering.rays.shadows import find_shadows
 from rigid_envs.rendering.rays.visibility import find_nearest
 
 SOURCES = hash_sources(Path(__file__).parent)
@@ -22,17 +22,19 @@ def make_draw() -> Any:
     Args:
         first, last: worlds.
         primitives: [worlds, n], of PRIMITIVE: the solids.
+        order: [worlds, n], their indices, those nearest to the sun first.
         glass: [worlds, g], of PRIMITIVE: what is see-through, far ones first.
         decals: [worlds, d], of DECAL.
         polygons: [worlds, p], of POLYGON.
         camera: [1], of CAMERA.
-        sun: [3], unit vector.
+        sun_frame: [3, 3], rows are two unit vectors across the light, and the one to the sun.
         points: [samples, 3], directions to points of the sun; none: no shadows.
         tiles: [rows, columns, 3], picture of the empty ground.
         tile_depth: [rows, columns] m, its depth; infinite above the horizon.
         smooths: whether borders are smoothed.
-        depth, shown, hidden, ground, around: working memory: [rows, columns] of numbers, integers
-            and bytes, [rows, columns, 3] bytes, [9, 2] integers.
+        depth, shown, hidden, ground, around, starts, entries: working memory: [rows, columns] of
+            numbers, integers and bytes, [rows, columns, 3] bytes, [9, 2] integers, and that of
+            `find_shadows`.
         rgb: [worlds, rows, columns, 3] bytes, is written.
         depths: [worlds, rows, columns] m, is written; of no worlds if it isn't wanted.
         solids: [worlds, rows, columns], the solids that are seen; likewise.
@@ -42,12 +44,13 @@ def make_draw() -> Any:
 
     @large_entry
     def draw(
-        first, last, primitives, glass, decals, polygons, camera, sun, points, tiles, tile_depth,
-        smooths, depth, shown, hidden, ground, around, rgb, depths, solids, ground_solid,
+        first, last, primitives, order, glass, decals, polygons, camera, sun_frame, points, tiles,
+        tile_depth, smooths, depth, shown, hidden, ground, around, starts, entries, rgb, depths,
+        solids, ground_solid,
     ):  # fmt: skip
         _ = sources, engine
         rows, columns = depth.shape
-        view, samples = camera[0], len(points)
+        view, samples, sun = camera[0], len(points), sun_frame[2]
         for w in range(first, last):
             for row in range(rows):
                 for column in range(columns):
@@ -57,7 +60,10 @@ def make_draw() -> Any:
             bounds = find_nearest(primitives[w], view, depth, shown)
             if rgb.shape[0] > 0:
                 if samples > 0:
-                    find_shadows(primitives[w], view, sun, points, depth, shown, hidden)
+                    find_shadows(
+                        primitives[w], order[w], view, sun_frame, points, depth, shown, starts,
+                        entries, hidden,
+                    )  # fmt: skip
                 for row in range(rows):
                     for column in range(columns):
                         for k in range(3):

@@ -66,10 +66,14 @@ def draw_glass(glass, camera, sun, depth, rgb):
         ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
         for row in range(top, bottom):
             for column in range(left, right):
-                cover, diffuse, shine, facing = 0.0, 0.0, 0.0, 0.0
-                for look in range(4):
+                seen, diffuse, shine, facing, looks = 0, 0.0, 0.0, 0.0, 2
+                look = 0
+                while look < looks:
+                    # two opposite quarters of the pixel, and the other two if these differ
+                    down = look % 2
+                    across = down if look < 2 else 1 - down
                     dx, dy, dz = sight(
-                        camera, row + 0.25 + 0.5 * (look // 2), column + 0.25 + 0.5 * (look % 2)
+                        camera, row + 0.25 + 0.5 * down, column + 0.25 + 0.5 * across
                     )
                     ex, ey, ez = turned_into(p, dx, dy, dz)
                     t, lx, ly, lz = intersection(
@@ -82,14 +86,17 @@ def draw_glass(glass, camera, sun, depth, rgb):
                         nz = A[0, 2] * lx + A[1, 2] * ly + A[2, 2] * lz
                         d, s = brightness(nx, ny, nz, dx, dy, dz, sun, 1.0, p.gloss)
                         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-                        cover, diffuse, shine = cover + 0.25, diffuse + d, shine + s
+                        seen, diffuse, shine = seen + 1, diffuse + d, shine + s
                         facing += abs(nx * dx + ny * dy + nz * dz) / length
-                if cover > 0.0:
-                    k = 0.25 / cover
+                    look += 1
+                    if (look == 2) & (seen == 1):
+                        looks = 4
+                if seen > 0:
+                    k = 1.0 / seen
                     opacity = p.opacity
                     if p.kind == SPHERE:
                         opacity = min(opacity + RIM * (1.0 - k * facing) ** 2, 1.0)
-                    blend(rgb, row, column, p.color, k * diffuse, k * shine, cover * opacity)
+                    blend(rgb, row, column, p.color, k * diffuse, k * shine, seen / looks * opacity)
 
 
 @stage

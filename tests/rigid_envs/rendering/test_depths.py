@@ -141,7 +141,7 @@ def test_a_world_is_drawn_as_if_it_were_alone_with_any_number_of_threads():
         ]  # fmt: skip
 
     def draw(chosen, threads):
-        renderer = Renderer(48, 32, CAMERA, fine=threads == 1, threads=threads)
+        renderer = Renderer(48, 32, CAMERA, soft=threads == 1, threads=threads)
         overlays = [renderer.overlay([Goal(places[0, w], 0.03)]) for w in chosen]
         count = len(chosen)
         return renderer.frames(items(chosen), overlays, worlds=count, depth=True, solid=True)

@@ -2,6 +2,8 @@
 
 import re
 
+import imageio.v2 as imageio
+import numpy as np
 import pytest
 
 from physics import World
@@ -66,3 +68,29 @@ def test_scenes_have_as_many_bodies_as_asked_for_and_none_overlap_deeply(name):
 def test_a_pyramid_has_complete_rows():
     assert len(pyramid(5050).scene.bodies) == 5050
     assert len(pyramid(54).scene.bodies) == 45
+
+
+@pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
+def test_a_video_has_a_frame_for_each_25th_of_a_second(name, tmp_path, capsys):
+    video = tmp_path / "made" / name
+    words = ["scene", "heap", "--bodies", "40", "--seconds", "0.2", "--size", "64"]
+    assert main([*words, "--video", str(video)]) == 0
+    assert "film" in capsys.readouterr().out
+    frames = imageio.mimread(video)
+    assert len(frames) == (6 if name.endswith("mp4") else 3)  # a GIF has every second one
+    assert np.shape(frames[0])[:2] == (64, 64)
+    assert (frames[0] != frames[-1]).any()
+
+
+@pytest.mark.parametrize(
+    ("video", "message"),
+    [
+        ("film.avi", r"'film\.avi', should end in \.mp4 or \.gif"),
+        ("/proc/none/film.mp4", r"cannot write '/proc/none/film\.mp4'"),
+    ],
+)
+def test_a_video_that_cannot_be_written_is_named_before_anything_runs(video, message, capsys):
+    assert main(["scene", "heap", "--bodies", "40", "--video", video]) == 2
+    shown = capsys.readouterr()
+    assert re.search(message, shown.err)
+    assert "simulated" not in shown.out

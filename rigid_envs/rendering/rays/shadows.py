@@ -1,0 +1,202 @@
+"""Where solids hide the sun.
+
+Primitives are sorted into the cells of a grid that lies across the sunlight, each into all cells
+that its shadow may reach. What a point of a surface sees of the sun, only the primitives of its
+cell can hide.
+"""
+
+import math
+
+from physics.compiler.jit import stage
+from rigid_envs.rendering.rays.intersections import TORUS, TRIANGLE, intersection
+from rigid_envs.rendering.rays.light import SUN_SIZE
+from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
+
+MOST_CELLS = 256  # along one side of the grid
+_SELF = 1e-4  # of its reach, how far from itself a hollow solid can hide the sun
+
+
+@stage
+def _shadow_radius(p, sun, spread):
+    """m, of a disc across the light that holds a primitive's shadow, down to the ground."""
+    return p.reach + spread * max(p.position[2] + p.reach, 0.0) / sun[2]
+
+
+@stage
+def _across(frame, x, y, z):
+    """Coordinates of a point across the light: the first two rows of `frame` [3, 3]."""
+    return (
+        frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
+        frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z,
+    )
+
+
+@stage
+def _cells_of(u, v, radius, left, bottom, cell, side):
+    """First and last cell along both sides (inclusive) that a disc may reach."""
+    return (
+        min(max(math.floor((u - radius - left) / cell), 0), side - 1),
+        min(max(math.floor((u + radius - left) / cell), 0), side - 1),
+        min(max(math.floor((v - radius - bottom) / cell), 0), side - 1),
+        min(max(math.floor((v + radius - bottom) / cell), 0), side - 1),
+    )
+
+
+@stage
+def sort_into_cells(primitives, order, frame, spread, starts, entries):
+    """Lists the primitives of every cell, those nearest to the sun first.
+
+    The grid has about as many cells as there are primitives, or fewer if the lists would not fit.
+
+    Args:
+        primitives: [n], of PRIMITIVE.
+        order: [n], their indices, those nearest to the sun first.
+        frame: [3, 3], rows are two unit vectors across the light, and the one to the sun.
+        spread: half-width of the sun over its distance.
+        starts: [cells + 1], on return where each cell's list begins.
+        entries: [capacity, at least n], on return the lists.
+
+    Returns:
+        (left, bottom, cell, side): corner of the grid and width of a cell in m, cells along a side.
+    """
+    left, right, bottom, top = math.inf, -math.inf, math.inf, -math.inf
+    sun = frame[2]
+    for n in range(len(primitives)):
+        p = primitives[n]
+        u, v = _across(frame, p.position[0], p.position[1], p.position[2])
+        radius = _shadow_radius(p, sun, spread)
+        left, right = min(left, u - radius), max(right, u + radius)
+        bottom, top = min(bottom, v - radius), max(top, v + radius)
+    width = max(right - left, top - bottom)
+    side = min(max(math.ceil(math.sqrt(len(primitives))), 1), MOST_CELLS)
+    while True:
+        cell = width / side
+        for k in range(side * side + 1):
+            starts[k] = 0
+        total = 0
+        for n in range(len(primitives)):
+            p = primitives[n]
+            u, v = _across(frame, p.position[0], p.position[1], p.position[2])
+            radius = _shadow_radius(p, sun, spread)
+            u0, u1, v0, v1 = _cells_of(u, v, radius, left, bottom, cell, side)
+            total += (u1 - u0 + 1) * (v1 - v0 + 1)
+            if total > len(entries):
+                break
+            for b in range(v0, v1 + 1):
+                for a in range(u0, u1 + 1):
+                    starts[b * side + a + 1] += 1
+        if total <= len(entries):
+            break
+        side = max(side // 2, 1)
+    for k in range(side * side):
+        starts[k + 1] += starts[k]
+    # from the last to the first, so that every cell's list is filled from its end
+    for k in range(len(order) - 1, -1, -1):
+        p = primitives[order[k]]
+        u, v = _across(frame, p.position[0], p.position[1], p.position[2])
+        radius = _shadow_radius(p, sun, spread)
+        u0, u1, v0, v1 = _cells_of(u, v, radius, left, bottom, cell, side)
+        for b in range(v0, v1 + 1):
+            for a in range(u0, u1 + 1):
+                slot = b * side + a + 1
+                starts[slot] -= 1
+                entries[starts[slot]] = order[k]
+    # the end of a cell's list has become its start: they are one place too far
+    for k in range(side * side):
+        starts[k] = starts[k + 1]
+    starts[side * side] = total
+    return left, bottom, cell, side
+
+
+@stage
+def shaded_pixels(primitives, camera, sun, spread, rows, columns):
+    """First and last row and column (exclusive) of the pixels that any shadow may reach.
+
+    A primitive's shadow lies between the sphere around it and that sphere's shadow on the ground.
+    """
+    top, bottom, left, right = rows, 0, columns, 0
+    for n in range(len(primitives)):
+        p = primitives[n]
+        x, y, z, reach = p.position[0], p.position[1], p.position[2], p.reach
+        for end in range(2):
+            radius = reach
+            if end == 1:
+                way = max(z, 0.0) / sun[2]
+                radius = (reach + spread * way) / sun[2]
+                x, y, z = x - way * sun[0], y - way * sun[1], 0.0
+            row, last_row, column, last_column = bounds(camera, x, y, z, radius, rows, columns)
+            if (last_row > row) & (last_column > column):
+                top, bottom = min(top, row), max(bottom, last_row)
+                left, right = min(left, column), max(right, last_column)
+    return top, bottom, left, right
+
+
+@stage
+def find_shadows(primitives, order, camera, frame, points, depth, shown, starts, entries, hidden):
+    """Which points of the sun are hidden from what each pixel shows.
+
+    Args:
+        primitives: [n], of PRIMITIVE.
+        order: [n], their indices, those nearest to the sun first.
+        camera: a record of CAMERA.
+        frame: [3, 3], rows are two unit vectors across the light, and the one to the sun.
+        points: [samples, 3], directions to points of the sun.
+        depth: [rows, columns] m.
+        shown: [rows, columns], which primitive, or -1.
+        starts: [MOST_CELLS^2 + 1], working memory.
+        entries: [at least n], working memory.
+        hidden: [rows, columns], of a bit for each sample; at first 0.
+    """
+    if len(primitives) == 0:
+        return
+    spread = SUN_SIZE if len(points) > 1 else 0.0
+    sun, every, largest = frame[2], (1 << len(points)) - 1, 0.0
+    for n in range(len(primitives)):
+        largest = max(largest, primitives[n].reach)
+    left, low, cell, side = sort_into_cells(primitives, order, frame, spread, starts, entries)
+    rows, columns = depth.shape
+    top, bottom, first, last = shaded_pixels(primitives, camera, sun, spread, rows, columns)
+    for row in range(top, bottom):
+        for column in range(first, last):
+            t = depth[row, column]
+            if t == math.inf:
+                continue
+            dx, dy, dz = sight(camera, row + 0.5, column + 0.5)
+            x, y, z = camera.eye[0] + t * dx, camera.eye[1] + t * dy, camera.eye[2] + t * dz
+            u, v = _across(frame, x, y, z)
+            a, b = math.floor((u - left) / cell), math.floor((v - low) / cell)
+            if (a < 0) | (b < 0) | (a >= side) | (b >= side):
+                continue
+            own, found = shown[row, column], 0
+            for k in range(starts[b * side + a], starts[b * side + a + 1]):
+                p = primitives[entries[k]]
+                vx, vy, vz = p.position[0] - x, p.position[1] - y, p.position[2] - z
+                way = vx * sun[0] + vy * sun[1] + vz * sun[2]
+                if way < -largest:
+                    break  # this one and all that follow are behind the point
+                hollow = (p.kind == TRIANGLE) | (p.kind == TORUS)
+                room = p.reach + spread * max(way, 0.0)
+                aside = vx * vx + vy * vy + vz * vz - way * way
+                itself = (own == entries[k]) & (not hollow)
+                if itself | (way < -p.reach) | (aside > room * room):
+                    continue
+                found |= _hidden_by(p, x, y, z, points, hollow)
+                if found == every:
+                    break
+            hidden[row, column] = found
+
+
+@stage
+def _hidden_by(p, x, y, z, points, hollow):
+    """Bits of the points of the sun that a primitive hides from a point of a surface."""
+    ox, oy, oz = seen_from(p, x, y, z)
+    least, found = _SELF * p.reach if hollow else 0.0, 0
+    for s in range(len(points)):
+        ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
+        at, _, _, _ = intersection(
+            p.kind, p.size[0], p.size[1], p.size[2],
+            ox + least * ex, oy + least * ey, oz + least * ez, ex, ey, ez,
+        )  # fmt: skip
+        if at < math.inf:
+            found |= 1 << s
+    return found
