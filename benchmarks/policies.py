@@ -95,7 +95,7 @@ def shipped() -> Table:
     for algorithm in ALGORITHMS:
         for task in TASKS:
             name = _id(task).replace("/", "-")
-            files = sorted((SHIPPED / algorithm).glob(f"{name}_seed*/policy.policy"))
+            files = sorted((SHIPPED / algorithm).glob(f"{name}_seed*/policy.safetensors"))
             if not files:
                 continue
             policies = [trained_policy(file) for file in files]

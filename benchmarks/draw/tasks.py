@@ -101,5 +101,5 @@ def _player(
     if arguments:
         env_id = f"RigidEnvs/{task}-v0"
         return env_id, arguments, controller_for(env_id)
-    policy = read_policy(ROOT / f"results/ppo/RigidEnvs-{task}-v0_seed0/policy.policy")
+    policy = read_policy(ROOT / f"results/ppo/RigidEnvs-{task}-v0_seed0/policy.safetensors")
     return policy.env_id, policy.env_kwargs, policy.act

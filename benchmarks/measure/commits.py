@@ -25,7 +25,8 @@ TURNS = {"push": 120, "stack": 60, "throw": 120}
 TASKS = tuple(TURNS)
 PRESETS = ("fast", "balanced", "accurate", "solid")
 WORLDS, EPISODES = 4096, 100
-POLICIES, POLICY = ROOT / "results" / "ppo", "RigidEnvs-{}-v0_seed0/policy.policy"
+# of each tree its own file, as its format may differ
+POLICY = "results/ppo/RigidEnvs-{}-v0_seed0"
 PEERS = Path(__file__).resolve().parents[1] / "peers"
 
 Array = np.ndarray
@@ -92,7 +93,7 @@ def speed(
             sides = {}
             for name, tree in trees.items():
                 arguments = [task, str(worlds), str(threads)]
-                arguments += [str(POLICIES / POLICY.format(task.capitalize()))] if policies else []
+                arguments += [POLICY.format(task.capitalize())] if policies else []
                 command: Command = [sys.executable, PEERS / "episodes.py", *arguments]
                 sides[name] = children.enter_context(child(command, tree))
             rates = take_turns(sides, rounds, 0.0)  # a turn is one episode, whatever it takes

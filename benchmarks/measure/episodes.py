@@ -26,7 +26,7 @@ def id_of(task: str) -> str:
 def policy_of(task: str) -> PolicyFile:
     """The trained policy of a task that comes with the project."""
     folder = ROOT / "results" / "ppo" / f"RigidEnvs-{task.capitalize()}-v0_seed0"
-    return load_policy_file(folder / "policy.policy")
+    return load_policy_file(folder / "policy.safetensors")
 
 
 def vector_side(task: str, fidelity: str, worlds: int = WORLDS, trained: bool = False) -> Side:

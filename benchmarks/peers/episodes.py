@@ -28,8 +28,9 @@ if tree != Path.cwd().resolve():
 policy: Any = None
 arguments: dict[str, Any] = {}
 if len(sys.argv) > 4:
+    (file,) = Path(sys.argv[4]).glob("policy.*")
     module = "policies.policy_file" if Path("training/policies").is_dir() else "policy_file"
-    policy = import_module(f"training.{module}").load_policy_file(Path(sys.argv[4]))
+    policy = import_module(f"training.{module}").load_policy_file(file)
     arguments = dict(policy.header.environment.kwargs)
     if not Path("training/policies").is_dir():  # until November 2026
         arguments = {"guided": True} if arguments.get("observe_task_guide") else {}

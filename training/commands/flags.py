@@ -59,7 +59,7 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
         "policy",
         nargs="?",
         metavar="POLICY",
-        help='run folder, .policy file, model.zip or "scripted" '
+        help='run folder, .safetensors file, model.zip or "scripted" '
         "(default: latest run of --algo on --env)",
     )
     add_latest(parser)
@@ -107,7 +107,7 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--policy", default="scripted", metavar="POLICY",
-        help='whose actions are repeated: run folder, .policy file or "scripted" (default)',
+        help='whose actions are repeated: run folder, .safetensors file or "scripted" (default)',
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=positive, default=1e-3,
@@ -150,7 +150,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         type=Path,
-        help="file to write (default: <run>.policy in the current folder)",
+        help="file to write (default: <run>.safetensors in the current folder)",
     )
     parser.add_argument(
         "-n",
@@ -211,7 +211,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--policy",
         metavar="POLICY",
-        help='run folder, .policy file or "scripted" (default: random actions)',
+        help='run folder, .safetensors file or "scripted" (default: random actions)',
     )
     parser.add_argument(
         "--num-worlds", type=count, default=16, help="number of worlds (default: %(default)s)"

@@ -87,7 +87,9 @@ def record(options: argparse.Namespace) -> int:
     policy = policy_of(options)
     given = Path(options.policy) if options.policy else None
     default = (policy.folder or options.log_folder / policy.name) / "video.mp4"
-    if given is not None and given.suffix == ".policy":  # its folder may contain other policies
+    if (
+        given is not None and given.suffix == ".safetensors"
+    ):  # its folder may contain other policies
         default = given.with_suffix(".mp4")
     path, still = video.record(
         policy,
@@ -118,7 +120,7 @@ def export(options: argparse.Namespace) -> int:
             policy.env_kwargs.get("fidelity"),
             result.first_seed,
         )
-    output = options.output or Path(f"{folder.path.name}.policy")
+    output = options.output or Path(f"{folder.path.name}.safetensors")
     for file in export_run(folder, output, success=success, sb3=options.sb3):
         print(file)
     return 0

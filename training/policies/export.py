@@ -52,7 +52,7 @@ def export_run(
 
     Args:
         folder: The run.
-        output: The file to write, with the suffix .policy.
+        output: The file to write, with the suffix .safetensors.
         success: Measured success to store in the file.
         sb3: Also copy Stable-Baselines3's files, under the same name with .zip and .pkl.
 

@@ -1,14 +1,12 @@
 """Policy files: a trained policy as text and numbers; reading one executes no code from it.
 
-    rigid-envs policy 1      kind of file, and version of the format
-    <SHA-256>                checksum of everything below, in hexadecimal
-    {...}                    the header, JSON in UTF-8, ended by a zero byte
-    numbers                  little endian: mean and variance (float64) of each normalised
-                             observation key; weights (outputs, inputs) and biases (float32) of
-                             each layer
+They are files of safetensors, which many programs can read. Their metadata have one entry,
+`rigid-envs policy`: a JSON object with the version of the `format`, the `header`, and the `sha256`
+of header and numbers. The tensors are `mean.KEY` and `variance.KEY` (float64) of each normalised
+observation key, and `layer.N.weight` (outputs, inputs) and `layer.N.bias` (float32) of each layer.
 
-`head -c 2000 FILE` shows the header. It determines how many numbers follow. A file with any changed
-byte is rejected. Stable-Baselines3's own files are pickles, which can run any code when loaded.
+A file with any changed byte is rejected. Stable-Baselines3's own files are pickles, which can run
+any code when loaded.
 """
 
 import hashlib
@@ -22,17 +20,20 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.policies.policy import Policy
-from training.policies.policy_header import Header, InvalidHeader, read_header
+from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, nearest
 
-SUFFIX = ".policy"
-FORMAT = 1
-MAGIC = b"rigid-envs policy "
+SUFFIX = ".safetensors"
+FORMAT = 2
+ENTRY = "rigid-envs policy"
+"""Name of the entry of the metadata."""
 MAX_BYTES = 2**28
 """Largest file that is read: far more than any policy needs, and less than the memory."""
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -115,27 +116,38 @@ class PolicyFile:
             UsageError: Shapes contradict the header, a number is not finite, or JSON cannot
                 represent an argument of the environment.
         """
-        arrays = [part for key in self.mean for part in (self.mean[key], self.variance[key])]
-        arrays += [part for layer in self.layers for part in layer]
-        expected = _shapes(self.header)
-        if [array.shape for array in arrays] != [shape for shape, _ in expected]:
-            raise UsageError(
-                f"arrays have the shapes {[array.shape for array in arrays]}, but the header "
-                f"requires {[shape for shape, _ in expected]}"
-            )
-        if not all(np.isfinite(array).all() for array in arrays):
+        tensors = self._tensors()
+        expected = _tensors_of(self.header)
+        shapes = {name: tensor.shape for name, tensor in tensors.items()}
+        required = {name: shape for name, (shape, _) in expected.items()}
+        if shapes != required:
+            raise UsageError(f"arrays have the shapes {shapes}, but the header requires {required}")
+        if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
             raise UsageError("weights or statistics are not finite: training has diverged")
+        typed = {name: tensors[name].astype(dtype) for name, (_, dtype) in expected.items()}
+        header = asdict(self.header)
         try:
-            text = json.dumps(asdict(self.header), indent=1, allow_nan=False, ensure_ascii=False)
+            entry = {"format": FORMAT, "header": header, "sha256": checksum(header, typed)}
+            text = json.dumps(entry, indent=1, allow_nan=False)
         except (TypeError, ValueError) as error:
             raise UsageError(f"JSON cannot represent env_kwargs: {error}") from None
-        numbers = b"".join(
-            array.astype(dtype).tobytes()
-            for array, (_, dtype) in zip(arrays, expected, strict=True)
-        )
-        body = text.encode("utf-8") + b"\0" + numbers
-        digest = hashlib.sha256(body).hexdigest().encode("ascii")
-        return MAGIC + str(FORMAT).encode("ascii") + b"\n" + digest + b"\n" + body
+        return save(typed, {ENTRY: text})
+
+    def _tensors(self) -> dict[str, np.ndarray]:
+        named = {f"mean.{key}": array for key, array in self.mean.items()}
+        named |= {f"variance.{key}": array for key, array in self.variance.items()}
+        for n, (weight, bias) in enumerate(self.layers):
+            named |= {f"layer.{n}.weight": weight, f"layer.{n}.bias": bias}
+        return named
+
+
+def checksum(header: Any, tensors: dict[str, np.ndarray]) -> str:
+    """SHA-256 of a header, as JSON can represent it, and of tensors."""
+    digest = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
+    for name in sorted(tensors):
+        digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode())
+        digest.update(np.ascontiguousarray(tensors[name]).tobytes())
+    return digest.hexdigest()
 
 
 def load_policy_file(path: Path) -> PolicyFile:
@@ -151,25 +163,30 @@ def load_policy_file(path: Path) -> PolicyFile:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from None
-    if not data.startswith(MAGIC) or len(data) > MAX_BYTES:
-        raise UsageError(f"{path} is not a policy file; to write one: rigid-envs export RUN")
-    version, _, rest = data.removeprefix(MAGIC).partition(b"\n")
-    if version != str(FORMAT).encode("ascii"):
-        shown = version[:20].decode("ascii", "replace")
+    not_a_policy = f"{path} is not a policy file; to write one: rigid-envs export RUN"
+    if len(data) > MAX_BYTES:
+        raise UsageError(not_a_policy)
+    try:
+        tensors = load(data)
+        metadata = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]
+        entry = json.loads(metadata[ENTRY], parse_constant=reject_constant)
+        version, header, digest = entry["format"], entry["header"], entry["sha256"]
+    except (SafetensorError, ValueError, KeyError, TypeError, RecursionError):
+        raise UsageError(not_a_policy) from None
+    if version != FORMAT:
         raise UsageError(
-            f"{path} has format version {shown!r}, should be {FORMAT}; "
+            f"{path} has format version {version!r}, should be {FORMAT}; "
             "it is damaged, or from a newer rigid-envs"
         )
-    digest, _, body = rest.partition(b"\n")
-    if hashlib.sha256(body).hexdigest().encode("ascii") != digest:
+    # what is between the parts of the file, such as blanks, has no checksum
+    if digest != checksum(header, tensors) or save(tensors, metadata) != data:
         raise UsageError(f"{path} is damaged: its checksum is wrong; copy or export it again")
-    text, _, numbers = body.partition(b"\0")
     try:
-        header = read_header(text)
-        mean, variance, layers = _arrays(header, numbers)
+        checked = read_header(header)
+        mean, variance, layers = _arrays(checked, tensors)
     except InvalidHeader as error:
         raise UsageError(f"{path}: {error}") from None
-    return PolicyFile(header, mean, variance, layers)
+    return PolicyFile(checked, mean, variance, layers)
 
 
 def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None = None) -> Policy:
@@ -220,44 +237,45 @@ def _check_installed(path: Path, env_id: str) -> None:
     )
 
 
-def _shapes(header: Header) -> list[tuple[tuple[int, ...], str]]:
-    """Shape and dtype of each array of a file, in order."""
+def _tensors_of(header: Header) -> dict[str, tuple[tuple[int, ...], str]]:
+    """Shape and dtype of each tensor of a file, by name."""
     keys = header.normalization.keys if header.normalization is not None else []
-    shapes: list[tuple[tuple[int, ...], str]] = []
+    tensors: dict[str, tuple[tuple[int, ...], str]] = {}
     for key in keys:
-        shapes += [(header.observation[key], "<f8")] * 2
-    for inputs, outputs in pairwise(header.network.widths):
-        shapes += [((outputs, inputs), "<f4"), ((outputs,), "<f4")]
-    return shapes
+        for name in ("mean", "variance"):
+            tensors[f"{name}.{key}"] = header.observation[key], "float64"
+    for n, (inputs, outputs) in enumerate(pairwise(header.network.widths)):
+        tensors[f"layer.{n}.weight"] = (outputs, inputs), "float32"
+        tensors[f"layer.{n}.bias"] = (outputs,), "float32"
+    return tensors
 
 
-def _arrays(header: Header, numbers: bytes) -> tuple[Any, Any, Any]:
+def _arrays(header: Header, tensors: dict[str, np.ndarray]) -> tuple[Any, Any, Any]:
     """Mean, variance and layers, as in PolicyFile.
 
     Raises:
-        InvalidHeader: The number of bytes contradicts the header, or a number is not finite.
+        InvalidHeader: The tensors contradict the header, or a number is not finite.
     """
-    shapes = _shapes(header)
-    # Python integers: very large widths must not overflow into a size that fits
-    sizes = [int(dtype[-1]) for _, dtype in shapes]
-    for index, (shape, _) in enumerate(shapes):
-        for side in shape:
-            sizes[index] *= side
-    if sum(sizes) != len(numbers):
-        raise InvalidHeader(
-            f"the header requires {sum(sizes)} bytes of numbers, but {len(numbers)} follow"
-        )
-    arrays, start = [], 0
-    for (shape, dtype), size in zip(shapes, sizes, strict=True):
-        array = np.frombuffer(numbers[start : start + size], dtype).reshape(shape)
-        if not np.isfinite(array).all():
-            raise InvalidHeader("a weight or statistic is not finite")
-        arrays.append(array)
-        start += size
+    expected = _tensors_of(header)
+    found = {name: (tensor.shape, str(tensor.dtype)) for name, tensor in tensors.items()}
+    for name in sorted({*expected, *found}):
+        if expected.get(name) != found.get(name):
+            raise InvalidHeader(
+                f"the header requires {_words(expected.get(name))} for {name}, but the file has "
+                f"{_words(found.get(name))}"
+            )
+    for name, tensor in tensors.items():
+        if not np.isfinite(tensor).all():
+            raise InvalidHeader(f"{name}: a weight or statistic is not finite")
     keys = header.normalization.keys if header.normalization is not None else []
-    mean = {key: arrays[2 * number] for number, key in enumerate(keys)}
-    variance = {key: arrays[2 * number + 1] for number, key in enumerate(keys)}
+    mean = {key: tensors[f"mean.{key}"] for key in keys}
+    variance = {key: tensors[f"variance.{key}"] for key in keys}
     if any((array < 0).any() for array in variance.values()):
         raise InvalidHeader("a variance is negative")
-    layers = arrays[2 * len(keys) :]
-    return mean, variance, list(zip(layers[::2], layers[1::2], strict=True))
+    count = len(header.network.widths) - 1
+    layers = [(tensors[f"layer.{n}.weight"], tensors[f"layer.{n}.bias"]) for n in range(count)]
+    return mean, variance, layers
+
+
+def _words(tensor: tuple[tuple[int, ...], str] | None) -> str:
+    return "no tensor" if tensor is None else f"{tensor[1]} of shape {tensor[0]}"

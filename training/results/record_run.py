@@ -196,7 +196,7 @@ def _write(result: Result, folder: RunFolder, config: TrainConfig, repository: P
     try:
         rate = result.success_at_end["rate"]
         success = Success(result.episodes, rate, result.fidelity, result.first_seed)
-        export_run(folder, unfinished / "policy.policy", success=success)
+        export_run(folder, unfinished / "policy.safetensors", success=success)
         (unfinished / "config.yaml").write_text(config.as_yaml(), encoding="utf-8")
         _thin(folder.progress, unfinished / "progress.csv")
         (unfinished / RESULT).write_text(result.as_json(), encoding="utf-8")

@@ -4,7 +4,7 @@ results/<algo>/<environment>_seed<seed>/
     result.json      the result, see Result
     config.yaml      the settings, readable by `rigid-envs train --config`
     progress.csv     the learning curve, with fewer rows
-    policy.policy    the policy
+    policy.safetensors    the policy
 """
 
 import dataclasses

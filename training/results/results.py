@@ -121,7 +121,7 @@ def _update_images(
         )
         report(f"plotted  {curve}")
     if not (repository / video).exists():
-        _record_gif(group[0].folder(repository) / "policy.policy", repository / video, quiet)
+        _record_gif(group[0].folder(repository) / "policy.safetensors", repository / video, quiet)
         report(f"video    {video}")
 
 

@@ -28,8 +28,8 @@ Trained policies, each evaluated on episodes that it was not trained on, with it
 the learning curve and the policy of each row.
 
 ```sh
-rigid-envs evaluate results/ppo/RigidEnvs-Push-v0_seed0/policy.policy  # measure a policy again
-rigid-envs record results/ppo/RigidEnvs-Push-v0_seed0/policy.policy    # record a video of it
+rigid-envs evaluate results/ppo/RigidEnvs-Push-v0_seed0/policy.safetensors  # measure a policy again
+rigid-envs record results/ppo/RigidEnvs-Push-v0_seed0/policy.safetensors    # record a video of it
 ```
 
 The commands below each table repeat the training. With the same commit, packages and kind of
@@ -114,7 +114,7 @@ def check_pages(repository: Path) -> None:
             raise UsageError(f"{path} is out of date; to generate it: rigid-envs results")
     for result in read_results(repository):
         images = [repository / path for path in image_paths(result.kind)]
-        own = ("config.yaml", "progress.csv", "policy.policy")
+        own = ("config.yaml", "progress.csv", "policy.safetensors")
         for file in [*images, *(result.folder(repository) / name for name in own)]:
             if not file.exists():
                 raise UsageError(f"{file} is missing; to generate it: rigid-envs results")

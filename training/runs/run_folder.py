@@ -58,7 +58,7 @@ class RunFolder:
     @property
     def policy(self) -> Path:
         """The policy file of the last checkpoint."""
-        return self.checkpoint / "policy.policy"
+        return self.checkpoint / "policy.safetensors"
 
     @property
     def model(self) -> Path:

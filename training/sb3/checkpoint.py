@@ -1,7 +1,7 @@
 """Checkpoints, each a folder that is written atomically: files of two are never mixed.
 
     checkpoint_<number>/
-        policy.policy                 the policy
+        policy.safetensors                 the policy
         model.zip, vecnormalize.pkl   the policy in Stable-Baselines3's own formats
         state.json, tensors.pt, replay.npz   the state that training resumes from, see model_state
         progress.csv                  the learning curve so far

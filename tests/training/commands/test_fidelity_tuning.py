@@ -70,7 +70,7 @@ def test_a_trained_policy_brings_its_environment(asked, capsys):
 
 
 def test_arguments_of_the_environment_replace_those_of_the_policy(asked):
-    (file,) = (POLICIES / "RigidEnvs-Push-v0_seed0").glob("*.policy")
+    (file,) = (POLICIES / "RigidEnvs-Push-v0_seed0").glob("*.safetensors")
     words = ("--policy", str(file), "--env-kwargs", "obstacles:2")
     assert tune_fidelity(*words) == 0
     assert len(asked[0]["scene"].statics) > 1

@@ -53,7 +53,7 @@ def test_the_scripted_controller_gets_the_arguments_of_the_environment(viewed):
 
 
 def test_a_trained_policy_brings_its_environment(viewed):
-    (file,) = PUSH_POLICY.glob("*.policy")
+    (file,) = PUSH_POLICY.glob("*.safetensors")
     assert view("--policy", str(file), "--num-worlds", "4") == 0
     (session,) = viewed
     assert type(session.runner.task).__name__ == "Push"
@@ -84,7 +84,7 @@ def test_mistakes_are_reported_in_one_line(words, complaint, capfd, viewed):
 
 
 def test_a_policy_for_other_observations_is_rejected_before_the_page_opens(capfd, viewed):
-    (file,) = PUSH_POLICY.glob("*.policy")
+    (file,) = PUSH_POLICY.glob("*.safetensors")
     assert view("--policy", str(file), "--env", "RigidEnvs/Throw-v0") == 2
     assert "observations of shapes" in capfd.readouterr().err
     assert not viewed

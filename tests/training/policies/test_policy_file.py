@@ -1,7 +1,6 @@
 """Policy files: they act as Stable-Baselines3's policies, and damaged files are rejected."""
 
 import base64
-import hashlib
 import json
 import pickle
 import subprocess
@@ -14,11 +13,19 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from safetensors import safe_open
+from safetensors.numpy import save
 from threadpoolctl import threadpool_info
 
 from tests.training.reach import ReachVectorEnv
 from training.commands import cli
-from training.policies.policy_file import ACTIVATIONS, load_policy_file, read_policy
+from training.policies.policy_file import (
+    ACTIVATIONS,
+    ENTRY,
+    checksum,
+    load_policy_file,
+    read_policy,
+)
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.results.results import SOURCE
@@ -50,21 +57,28 @@ def saved(tmp_path_factory) -> Path:
     return train(config, tmp_path_factory.mktemp("runs"), quiet=True).folder.policy
 
 
-def rewritten(path: Path, tmp_path: Path, numbers: bytes = b"", **changes) -> Path:
-    """A copy with a changed header or additional numbers, and a valid checksum."""
-    first, _, body = path.read_bytes().split(b"\n", 2)
-    text, _, rest = body.partition(b"\0")
-    header = json.loads(text)
+def parts(path: Path):
+    """Entry of the metadata, and tensors, as any program can read them."""
+    with safe_open(path, "numpy") as file:
+        entry = json.loads(file.metadata()[ENTRY])
+        return entry, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+
+
+def rewritten(path: Path, tmp_path: Path, extra: bool = False, **changes) -> Path:
+    """A copy with a changed header or an additional tensor, and a valid checksum."""
+    entry, tensors = parts(path)
+    if extra:
+        tensors["layer.9.bias"] = np.zeros(1, np.float32)
+    header = entry["header"]
     for name, value in changes.items():
         at = header
         *groups, last = name.split("__")
         for group in groups:
             at = at[group]
         at[last] = value
-    body = json.dumps(header).encode() + b"\0" + rest + numbers
-    digest = hashlib.sha256(body).hexdigest().encode()
-    changed = tmp_path / "changed.policy"
-    changed.write_bytes(b"\n".join([first, digest, body]))
+    entry["sha256"] = checksum(header, tensors)
+    changed = tmp_path / "changed.safetensors"
+    changed.write_bytes(save(tensors, {ENTRY: json.dumps(entry)}))
     return changed
 
 
@@ -154,7 +168,10 @@ def test_header_describes_the_training(saved):
     assert header.network.widths == [6, 64, 64, 2]
     assert (header.steps, header.seed, header.success) == (160, 0, None)
     assert header.versions["torch"]
-    assert b'"algorithm": "ppo"' in saved.read_bytes()[:200]
+    entry, tensors = parts(saved)
+    assert entry["header"]["algorithm"] == "ppo"
+    assert tensors["layer.0.weight"].shape == (64, 6)
+    assert tensors["mean.observation"].dtype == np.float64
 
 
 def test_packaged_networks_take_less_than_300_kilobytes(reach, tmp_path):
@@ -182,7 +199,7 @@ def test_any_changed_byte_raises(saved, tmp_path, data):
         other = whole[place] ^ data.draw(st.integers(1, 255))
         damaged = whole[:place] + bytes([other]) + whole[place + 1 :]
     damaged += data.draw(st.just(b"") | st.binary(max_size=3)) if len(damaged) < len(whole) else b""
-    path = tmp_path / "damaged.policy"
+    path = tmp_path / "damaged.safetensors"
     path.write_bytes(damaged)
     if damaged != whole:
         with pytest.raises(UsageError):
@@ -216,15 +233,18 @@ def test_arbitrary_header_raises_or_acts(saved, tmp_path, field, value):
         ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
         ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
-        ({"network__widths": [6, 64, 32, 2]}, "bytes of numbers"),
+        (
+            {"network__widths": [6, 64, 32, 2]},
+            r"requires float32 of shape \(32,\) for layer.1.bias",
+        ),
         ({"network__widths": [7, 64, 64, 2]}, "starts with 7, should be 6"),
-        ({"network__widths": [6, 2**40, 2**40, 2]}, "bytes of numbers"),
+        ({"network__widths": [6, 2**40, 2**40, 2]}, "but the file has float32"),
         ({"network__low": [-1.0]}, "network.low has 1 entries, should have 2"),
         ({"observation": {"observation": [6]}}, "should be observation"),
         ({"environment__version": 1}, "version is 1, but environment.id"),
         ({"normalization__clip": -1}, "should be above 0"),
         ({"colour": "red"}, "missing or unknown: colour"),
-        ({"numbers": b"1234"}, "bytes of numbers"),
+        ({"extra": True}, "requires no tensor for layer.9.bias"),
     ],
 )
 def test_invalid_header_fields_are_named(saved, tmp_path, changes, message):
@@ -233,16 +253,20 @@ def test_invalid_header_fields_are_named(saved, tmp_path, changes, message):
 
 
 def test_other_files_raise(saved, tmp_path):
-    path = tmp_path / "some.policy"
+    path = tmp_path / "some.safetensors"
     with pytest.raises(UsageError, match="does not exist"):
         trained_policy(path)
-    with pytest.raises(UsageError, match=r"does not exist; it should be a \.policy file"):
+    with pytest.raises(UsageError, match=r"does not exist; it should be a \.safetensors file"):
         read_policy(path)
     path.write_bytes(b"PK\x03\x04")
     with pytest.raises(UsageError, match="is not a policy file"):
         read_policy(path)
-    path.write_bytes(saved.read_bytes().replace(b"policy 1\n", b"policy 2\n", 1))
-    with pytest.raises(UsageError, match="has format version '2', should be 1"):
+    path.write_bytes(save({"weight": np.zeros(3)}, {"format": "pt"}))
+    with pytest.raises(UsageError, match="is not a policy file"):
+        read_policy(path)
+    entry, tensors = parts(saved)
+    path.write_bytes(save(tensors, {ENTRY: json.dumps({**entry, "format": 3})}))
+    with pytest.raises(UsageError, match="has format version 3, should be 2"):
         read_policy(path)
 
 
@@ -257,7 +281,7 @@ def test_another_version_of_the_environment_raises(saved, tmp_path):
 
 
 def test_arguments_that_an_id_sets_replace_those_of_training():
-    file = SOURCE / "results/sac/RigidEnvs-Push-v0_seed0/policy.policy"
+    file = SOURCE / "results/sac/RigidEnvs-Push-v0_seed0/policy.safetensors"
     assert read_policy(file).env_kwargs == {"reward_type": "sparse", "fidelity": "balanced"}
     dense = read_policy(file, env_id="RigidEnvs/PushDense-v0")
     assert dense.env_kwargs == {"reward_type": "dense", "fidelity": "balanced"}
@@ -308,7 +332,7 @@ def test_nothing_is_unpickled_without_permission(quick_ppo, tmp_path, capsys):
     with zipfile.ZipFile(folder.model, "w") as model:  # as Stable-Baselines3 packs objects
         packed = {":type:": "x", ":serialized:": base64.b64encode(trap).decode()}
         model.writestr("data", json.dumps({"policy_class": packed}))
-    run, elsewhere = str(folder.path), str(tmp_path / "other.policy")
+    run, elsewhere = str(folder.path), str(tmp_path / "other.safetensors")
     Path(elsewhere).write_bytes(folder.model.read_bytes())
     for policy in (run, str(folder.policy)):
         assert cli.main(["evaluate", policy, "-n", "2"]) == 0
@@ -325,10 +349,10 @@ def test_nothing_is_unpickled_without_permission(quick_ppo, tmp_path, capsys):
 
 def test_export_copies_the_policy_of_a_run(quick_ppo, tmp_path, capsys):
     folder = train(quick_ppo.replace(normalize=True), tmp_path, quiet=True).folder
-    out = tmp_path / "shared" / "reach.policy"
+    out = tmp_path / "shared" / "reach.safetensors"
     assert cli.main(["export", str(folder.path), "-o", str(out), "-n", "20", "--sb3"]) == 0
     assert {path.name for path in out.parent.iterdir()} == {
-        "reach.policy",
+        "reach.safetensors",
         "reach.zip",
         "reach.pkl",
     }
@@ -339,7 +363,7 @@ def test_export_copies_the_policy_of_a_run(quick_ppo, tmp_path, capsys):
     assert cli.main(["record", str(out), "-n", "1"]) == 0
     assert out.with_suffix(".mp4").exists()
     assert cli.main(["export", str(folder.path), "-o", str(tmp_path / "x.zip")]) == 2
-    assert "should end in .policy" in capsys.readouterr().err
+    assert "should end in .safetensors" in capsys.readouterr().err
     assert cli.main(["export", str(tmp_path)]) == 2
 
 

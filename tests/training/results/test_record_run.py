@@ -27,7 +27,7 @@ def test_result_contains_what_is_needed_to_judge_and_repeat_the_run(repository, 
         "result.json",
         "config.yaml",
         "progress.csv",
-        "policy.policy",
+        "policy.safetensors",
     }
     result = read_result(place / "result.json")
     state = read_state(RunFolder(runs / "ppo" / "Test-Reach-v0_1").checkpoint)
@@ -42,9 +42,9 @@ def test_result_contains_what_is_needed_to_judge_and_repeat_the_run(repository, 
     assert result.command == (
         f"rigid-envs train --algo ppo --env {reach} --config {PLACE.as_posix()}/config.yaml"
     )
-    outcome = evaluate(read_policy(place / "policy.policy"), 20, quiet=True)
+    outcome = evaluate(read_policy(place / "policy.safetensors"), 20, quiet=True)
     assert result.success_at_end["rate"] == outcome.success_at_end.mean()
-    header = load_policy_file(place / "policy.policy").header
+    header = load_policy_file(place / "policy.safetensors").header
     assert header.success is not None
     assert header.success.rate == result.success_at_end["rate"]
     check_pages(repository)
@@ -96,7 +96,7 @@ def enlarge(run: RunFolder) -> None:
         (lambda run: (run.path / "versions.json").write_text("3"), "versions.json is damaged"),
         (lambda run: (run.path / "config.yaml").unlink(), "config.yaml does not exist"),
         (lambda run: (run.path / "progress.csv").unlink(), "progress.csv is missing"),
-        (lambda run: run.policy.unlink(), "policy.policy is missing"),
+        (lambda run: run.policy.unlink(), "policy.safetensors is missing"),
         (lambda run: run.policy.write_bytes(b"no"), "is not a policy file"),
         (enlarge, "bytes, should have at most 300,000"),
         (lambda run: (run.checkpoint / "state.json").write_text("{}"), "state.json is damaged"),

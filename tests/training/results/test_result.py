@@ -14,7 +14,7 @@ from training.settings.errors import UsageError
 
 def test_shipped_policies_are_small_and_as_good_as_recorded():
     for result in read_results(SOURCE):
-        file = result.folder(SOURCE) / "policy.policy"
+        file = result.folder(SOURCE) / "policy.safetensors"
         assert file.stat().st_size <= 300_000
         outcome = evaluate(read_policy(file), 100, seed=FIRST_SEED, quiet=True)
         assert outcome.success_at_end.mean() >= result.success_at_end["low"] - 0.1

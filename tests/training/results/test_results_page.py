@@ -103,7 +103,7 @@ def test_check_names_files_that_are_out_of_date(repository, runs, capsys):
         assert cli.main([*where, "--check"]) == 2
         assert "is out of date; to generate it: rigid-envs results" in capsys.readouterr().err
         file.write_text(before)
-    for name in ("docs/results/ppo-Test-Reach-v0.gif", f"{PLACE}/policy.policy"):
+    for name in ("docs/results/ppo-Test-Reach-v0.gif", f"{PLACE}/policy.safetensors"):
         (repository / name).rename(repository / "moved")
         assert cli.main([*where, "--check"]) == 2
         assert f"{name} is missing" in capsys.readouterr().err
@@ -140,7 +140,7 @@ def test_readme_without_markers_raises(repository):
 
 def test_shipped_policies_can_be_evaluated_and_recorded(repository, runs, tmp_path, capsys):
     update(repository, runs / "ppo" / "Test-Reach-v0_1")
-    policy = str(repository / PLACE / "policy.policy")
+    policy = str(repository / PLACE / "policy.safetensors")
     assert cli.main(["evaluate", policy, "-n", "10"]) == 0
     assert "10 episodes" in capsys.readouterr().out
     assert cli.main(["record", policy, "-n", "1", "-o", str(tmp_path / "video.gif")]) == 0

@@ -219,7 +219,7 @@ def full_disk(*_args, **_kwargs):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("file", ["policy.policy", "tensors.pt", "model.zip", "progress.csv"])
+@pytest.mark.parametrize("file", ["policy.safetensors", "tensors.pt", "model.zip", "progress.csv"])
 def test_full_disk_leaves_the_last_checkpoint_intact(quick_ppo, tmp_path, monkeypatch, file):
     write, seen = checkpoint_module._write, []
 
