@@ -20,7 +20,7 @@ def wheel(tmp_path_factory) -> zipfile.ZipFile:
         (source / name).write_bytes((ROOT / name).read_bytes())
     for folder in ("physics", "rigid_envs", "training", "configs", "tests"):
         for file in (ROOT / folder).rglob("*"):
-            if file.suffix in (".py", ".yaml"):
+            if file.suffix in (".py", ".yaml", ".typed"):
                 copy = source / file.relative_to(ROOT)
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 copy.write_bytes(file.read_bytes())
@@ -40,6 +40,7 @@ def test_wheel_holds_every_module_and_setting(wheel):
         modules = {str(file.relative_to(ROOT)) for file in (ROOT / folder).rglob("*.py")}
         assert modules
         assert modules <= names
+        assert f"{folder}/py.typed" in names
     settings = {str(file.relative_to(ROOT)) for file in (ROOT / "configs").glob("*.yaml")}
     assert {"configs/ppo.yaml", "configs/sac.yaml"} <= settings <= names
 
