@@ -12,6 +12,7 @@ from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import check_seed
 from rigid_envs.episodes.pixels import pixel_settings
 from rigid_envs.episodes.runner import Observation, Runner
+from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward
@@ -116,6 +117,11 @@ class RigidEnv(gym.Env[Observation, Array]):
     def task(self) -> Task:
         """The task."""
         return self._runner.task
+
+    @property
+    def camera(self) -> Camera:
+        """Where frames and observed pictures are taken from."""
+        return self._pictures.camera
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

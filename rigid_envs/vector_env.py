@@ -14,6 +14,7 @@ from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, check_seed
 from rigid_envs.episodes.pixels import pixel_settings
 from rigid_envs.episodes.runner import Observation, Runner
+from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import Reward
@@ -130,6 +131,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     def task(self) -> Task:
         """The task."""
         return self._runner.task
+
+    @property
+    def camera(self) -> Camera:
+        """Where frames and observed pictures are taken from."""
+        return self._pictures.camera
 
     @property
     def runner(self) -> Runner:
@@ -269,10 +275,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._runner.compute_truncated(achieved_goal, info)
 
     def render(self) -> tuple[Array, ...] | None:
-        """A frame [480, 480, 3] uint8 of each of the first worlds; "human" shows them in a grid.
+        """A frame [height, width, 3] uint8 of each of the first worlds.
 
-        At most `render_worlds` worlds are drawn. `rigid_envs.rendering.renderer.grid` tiles the
-        frames.
+        "human" shows them in a grid. At most `render_worlds` worlds are drawn.
+        `rigid_envs.rendering.renderer.grid` tiles the frames.
         """
         if self.render_mode is None:
             gym.logger.warn('render() needs gym.make_vec(..., render_mode="rgb_array") or "human"')

@@ -21,7 +21,7 @@ def draw(path: Path) -> None:
         scene, fidelity = SCENES[name](bodies, 0)
         world = World(scene, fidelity)
         world.advance(seconds)
-        frame = Crowd(world, SIZE, SIZE).frame()
+        frame = Crowd(world, SIZE).frame()
         place = (n % 2 * (SIZE + GAP), n // 2 * (SIZE + GAP))
         picture.paste(Image.fromarray(np.asarray(frame)), place)
     path.parent.mkdir(parents=True, exist_ok=True)

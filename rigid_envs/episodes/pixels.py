@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-from physics import Ground
 from physics.scene.validation import choice, integer
 from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.cameras import choose_camera
@@ -23,6 +22,8 @@ CHANNELS = {"rgb": 3, "depth": 1, "segmentation": 1}
 
 SIZE = 84  # pixels, the width and height that most learners from pixels use
 LEAST, MOST = 8, 1024  # pixels
+MOST_SOLIDS = 255  # that a byte tells apart
+DEFAULTS: dict[str, Any] = {"pixels": ("rgb",), "pixel_size": (SIZE, SIZE), "frame_stack": 1}
 DEEPEST = 2.0  # depth of the brightest pixel, as a share of the camera's distance
 
 
@@ -69,10 +70,12 @@ def pixel_settings(
     width, height = (integer("pixel_size", n, low=LEAST, high=MOST) for n in size)
     stack = integer("frame_stack", frame_stack, low=1, high=64)
     if obs_type == "state":
-        if stack > 1:
-            raise ValueError(
-                f'frame_stack={stack} stacks pixels: it needs obs_type="pixels" or "pixels+state"'
-            )
+        given = {"pixels": kinds, "pixel_size": (width, height), "frame_stack": stack}
+        for name, value in given.items():
+            if value != DEFAULTS[name]:
+                raise ValueError(
+                    f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "state"'
+                )
         return None
     return PixelSettings(obs_type == "pixels+state", kinds, width, height, stack, camera)
 
@@ -102,21 +105,30 @@ class Pixels:
         self._runner, self._kinds, self._stack = runner, settings.kinds, settings.frame_stack
         width, height = settings.width, settings.height
         camera = choose_camera(settings.camera, runner.task.camera)
-        self._renderer = Renderer(width, height, camera, threads=runner.world.threads)
+        floor = scene_view.floor(runner.world.scene)
+        self._ground = floor.solid
+        self._renderer = Renderer(
+            width, height, camera, floor=floor.height, threads=runner.world.threads
+        )
+        solids = len(runner.world.scene.solid_names)
+        if "segmentation" in self._kinds and solids > MOST_SOLIDS:
+            raise ValueError(
+                f'pixels="segmentation" tells at most {MOST_SOLIDS} solids apart, got {solids}'
+            )
         self._channels = sum(CHANNELS[kind] for kind in self._kinds)
         shape = (height, width, self._channels * self._stack)
         self.space = spaces.Box(0, 255, shape, np.uint8)
         self._frames = np.zeros((runner.count, *shape), np.uint8)
-        # of each world, whether its picture is old, and whether its episode has just started
-        self._old, self._starts = np.ones((2, runner.count), dtype=bool)
-        grounds = [
-            i for i, static in enumerate(runner.world.scene.statics) if isinstance(static, Ground)
-        ]
-        scene = runner.world.scene
-        self._ground = len(scene.bodies) + len(scene.driven_bodies) + grounds[0] if grounds else -1
+        # of each world, whether its picture is old, whether it has made a step since, and whether
+        # its episode has just started
+        self._old, self._moved, self._starts = np.ones((3, runner.count), dtype=bool)
 
     def stepped(self) -> None:
-        """All worlds have moved."""
+        """All worlds have made a step."""
+        self._old[:] = self._moved[:] = True
+
+    def changed(self) -> None:
+        """All worlds look different, but have made no step."""
         self._old[:] = True
 
     def started(self, mask: Array) -> None:
@@ -134,24 +146,32 @@ class Pixels:
             else:
                 first = self._starts[worlds]
                 self._frames[worlds[first]] = np.tile(new[first], self._stack)
-                rest = worlds[~first]
-                self._frames[rest, ..., :-channels] = self._frames[rest, ..., channels:]
-                self._frames[rest, ..., -channels:] = new[~first]
-            self._old[:] = self._starts[:] = False
+                moved = worlds[~first & self._moved[worlds]]
+                self._frames[moved, ..., :-channels] = self._frames[moved, ..., channels:]
+                self._frames[worlds[~first], ..., -channels:] = new[~first]
+            self._old[:] = self._moved[:] = self._starts[:] = False
         return self._frames.copy()
 
     def get_state(self) -> dict[str, Array]:
         """What later observations depend on beside the worlds."""
         return {
             "frames": self._frames.copy(),
-            "old": self._old.copy(),
-            "starts": self._starts.copy(),
+            "flags": np.stack([self._old, self._moved, self._starts]),
         }
 
+    def check_state(self, state: dict[str, Array]) -> None:
+        """Raises ValueError for a state of pixels of another size or stack, or of other kinds."""
+        found = state["frames"].shape
+        if found != self._frames.shape:
+            raise ValueError(
+                f"state must have pixels of shape {self._frames.shape} (worlds, height, width, "
+                f"channels), got {found}"
+            )
+
     def set_state(self, state: dict[str, Array]) -> None:
-        """Restores `get_state`."""
-        self._frames[:], self._old[:] = state["frames"], state["old"]
-        self._starts[:] = state["starts"]
+        """Restores `get_state`, which `check_state` has accepted."""
+        self._frames[:] = state["frames"]
+        self._old[:], self._moved[:], self._starts[:] = state["flags"]
 
     def _draw(self, worlds: Array) -> Array:
         frames = self._renderer.frames(
@@ -181,6 +201,8 @@ class Pixels:
 
 def _check_kinds(kinds: Any) -> tuple[str, ...]:
     """Kinds of pixels: one name, or several of them, none twice."""
+    if not isinstance(kinds, str | tuple | list):
+        raise TypeError(f"pixels must be a name or a tuple of names, got {kinds!r}")
     names = (kinds,) if isinstance(kinds, str) else tuple(kinds)
     for name in names:
         choice("pixels", name, CHANNELS)

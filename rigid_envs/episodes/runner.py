@@ -229,6 +229,8 @@ class Runner:
         self._randomize(everyone, {**self._ranges, **randomize})
         self.randomization.draw(self.world, everyone, self._seeds, self._episodes)
         self._now = self.world.read()
+        if self._pixels:
+            self._pixels.changed()
 
     def change_fidelity(self, fidelity: str | Fidelity) -> None:
         """Replaces the worlds by worlds of another fidelity, with the episodes that are running.
@@ -458,6 +460,8 @@ class Runner:
             raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
         if state["version"] != STATE_VERSION:
             raise ValueError(f"state must have version {STATE_VERSION}, got {state['version']!r}")
+        if self._pixels:
+            self._pixels.check_state(state["pixels"])
         saved = state["world"]
         if isinstance(saved, Snapshot) and saved.parameters is not None:
             self.use_per_world_parameters()

@@ -13,7 +13,7 @@ from rigid_envs.rendering.rays.tables import CAMERA
 
 Array = np.ndarray
 
-NEAR = 0.1  # least depth that is drawn, as a share of the camera's distance
+NEAR = 0.01  # least depth that is drawn, as a share of the camera's distance
 _DOWN = np.array([1.0, -1.0])  # rows of a picture count downwards
 
 
@@ -132,16 +132,28 @@ class Camera:
         pixels = local[..., :2] * (scale[..., None] * _DOWN)
         return pixels + np.array([0.5 * width, 0.5 * height]), depth
 
-    def rays(self, width: int, height: int) -> Array:
-        """[height, width, 3], directions of the pixels' middles, with a depth of 1 m."""
+    def rays(self, width: int, height: int, rows: slice = slice(None)) -> Array:
+        """[height, width, 3], directions of the pixels' middles, with a depth of 1 m.
+
+        Args:
+            width: of the picture in pixels.
+            height: likewise.
+            rows: of which rows; by default of all.
+        """
         pixel = 1.0 / self.focal_length(height)
         x = pixel * (np.arange(width) + 0.5 - 0.5 * width)
-        y = pixel * (0.5 * height - np.arange(height) - 0.5)
+        y = pixel * (0.5 * height - np.arange(height)[rows] - 0.5)
         right, up, forward = self.axes
         return np.asarray(forward + x[:, None] * right + y[:, None, None] * up)
 
-    def table(self, width: int, height: int) -> Array:
-        """[1], of CAMERA: this camera for pictures of `width` x `height` pixels."""
-        focal = self.focal_length(height)
-        row = (self.eye, self.axes, focal, 1.0 / focal, self.near, 0.5 * width, 0.5 * height)
+    def table(self, width: int, height: int, floor: float = 0.0) -> Array:
+        """[1], of CAMERA: this camera for pictures of `width` x `height` pixels.
+
+        Args:
+            width: pixels.
+            height: pixels.
+            floor: m, height of the ground, which is z = 0 for kernels.
+        """
+        focal, eye = self.focal_length(height), self.eye - np.array([0.0, 0.0, floor])
+        row = (eye, self.axes, focal, 1.0 / focal, self.near, 0.5 * width, 0.5 * height)
         return np.array([row], dtype=CAMERA)

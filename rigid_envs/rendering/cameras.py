@@ -47,7 +47,7 @@ def choose_camera(given: Any, own: Camera) -> Camera:
 
 
 def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0) -> Camera:
-    """A camera that sees a box, from as near as it can.
+    """A camera whose square picture shows a box, from as near as it can.
 
     Args:
         low: (3,) m, least coordinates.

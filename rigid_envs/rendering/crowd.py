@@ -10,7 +10,7 @@ from physics.rotation import rotation_matrix
 from rigid_envs.rendering.cameras import looking_at
 from rigid_envs.rendering.primitives import placed, shape_primitives
 from rigid_envs.rendering.renderer import Renderer
-from rigid_envs.rendering.scene_view import DRIVE_COLOR, STATIC_COLOR
+from rigid_envs.rendering.scene_view import DRIVE_COLOR, STATIC_COLOR, floor
 from rigid_envs.rendering.view import BODY_COLORS, Item
 
 Array = np.ndarray
@@ -24,11 +24,10 @@ class Crowd:
 
     Args:
         world: with one world.
-        width: of a picture in pixels.
-        height: of a picture in pixels.
+        size: width and height of a picture in pixels.
     """
 
-    def __init__(self, world: World, width: int = 480, height: int = 480) -> None:
+    def __init__(self, world: World, size: int = 480) -> None:
         self._world, scene = world, world.scene
         kinds: dict[Any, list[int]] = defaultdict(list)
         for i, body in enumerate(scene.bodies):
@@ -37,9 +36,10 @@ class Crowd:
         reach = max(body.shape.reach for body in scene.bodies)
         position = world.position[0]
         low, high = position.min(axis=0) - reach, position.max(axis=0) + reach
-        camera = looking_at((*low[:2], 0.0), high)
+        ground = floor(scene).height
+        camera = looking_at((*low[:2], low[2] if ground is None else ground), high)
         # soft shadows of what hangs far above the ground would take most of the time
-        self._renderer = Renderer(width, height, camera, soft=False)
+        self._renderer = Renderer(size, size, camera, soft=False, floor=ground)
         self._colors = _colors(len(scene.bodies))
 
     def frame(self) -> Array:

@@ -25,7 +25,7 @@ class Overlay(NamedTuple):
     """Tables of what is drawn beside solids.
 
     Attributes:
-        glass: [g], of PRIMITIVE, far ones first.
+        glass: [g], of PRIMITIVE.
         decals: [d], of DECAL.
         polygons: [p], of POLYGON.
     """
@@ -36,30 +36,38 @@ class Overlay(NamedTuple):
 
 
 def overlay(
-    markers: Sequence[Marker], forces: Sequence[Arrow], camera: Camera, width: int, height: int
+    markers: Sequence[Marker],
+    forces: Sequence[Arrow],
+    camera: Camera,
+    width: int,
+    height: int,
+    floor: float,
 ) -> Overlay:
-    """Tables for pictures of `width` x `height` pixels."""
+    """Tables for pictures of `width` x `height` pixels, of a ground at a height `floor` m."""
     glass, decals, polygons = [np.zeros(0, PRIMITIVE)], [np.zeros(0, DECAL)], [_NONE]
     for marker in markers:
         if isinstance(marker, Goal):
-            glass += _ball(marker, camera)
+            glass += _ball(marker, camera, floor)
             decals.append(_disc(marker))
         elif isinstance(marker, Mark):
             decals.append(_cross(marker))
         elif isinstance(marker, Ghost):
             glass.append(_place(marker))
-            lines = box_corners(marker.position, np.eye(3), marker.half_extents)[EDGES]
+            lines = box_corners(marker.position, marker.half_extents)[EDGES]
             polygons.append(_strips(lines, marker.color, camera, width, height))
     for arrow in forces:
         polygons.append(_arrow(arrow, camera, width, height))
-    seen_through = np.concatenate(glass)
-    far = np.linalg.norm(seen_through["position"] - camera.eye, axis=1)
-    order = np.argsort(-far, kind="stable")
-    return Overlay(seen_through[order], np.concatenate(decals), np.concatenate(polygons))
+    return Overlay(np.concatenate(glass), np.concatenate(decals), np.concatenate(polygons))
 
 
 def stacked(overlays: Sequence[Overlay], worlds: int) -> Overlay:
-    """Tables [worlds, ...] of all overlays; empty places are filled by what can't be seen."""
+    """Tables [worlds, ...] of all overlays; empty places are filled by what can't be seen.
+
+    Raises:
+        ValueError: overlays that are neither none nor one for each world.
+    """
+    if len(overlays) not in (0, worlds):
+        raise ValueError(f"overlays must be none or {worlds}, one a world, got {len(overlays)}")
     tables = []
     for k, dtype in enumerate((PRIMITIVE, DECAL, POLYGON)):
         most = max((len(each[k]) for each in overlays), default=0)
@@ -73,15 +81,14 @@ def stacked(overlays: Sequence[Overlay], worlds: int) -> Overlay:
 _NONE = np.zeros(0, POLYGON)
 
 
-def box_corners(centre: Array, axes: Array, half: Array) -> Array:
-    """Corners [..., 8, 3] of boxes: centres [..., 3], columns of axes [..., 3, 3], half extents."""
-    spokes = np.einsum("...ij,kj,...j->...ki", axes, _SIGNS, half)
-    return np.asarray(centre[..., None, :] + spokes)
+def box_corners(centre: Array, half: Array) -> Array:
+    """Corners [8, 3] of an upright box: its centre and half extents [3]."""
+    return np.asarray(centre + _SIGNS * half)
 
 
-def _ball(goal: Goal, camera: Camera) -> list[Array]:
+def _ball(goal: Goal, camera: Camera, floor: float) -> list[Array]:
     """A ball, and a stem that shows over which spot it hangs; none below the ground."""
-    height = float(goal.position[2])
+    height = float(goal.position[2]) - floor
     if height <= 0.0:
         return []
     ball = balls(goal.position[None], min(goal.radius, height))
@@ -89,7 +96,7 @@ def _ball(goal: Goal, camera: Camera) -> list[Array]:
     if height <= goal.radius:
         return [ball]
     stem = primitives(1, CAPSULE)
-    stem["position"], stem["color"] = goal.position * (1.0, 1.0, 0.5), goal.color
+    stem["position"], stem["color"] = goal.position - (0.0, 0.0, 0.5 * height), goal.color
     thin = 0.5 * STEM * camera.distance
     stem["size"], stem["reach"] = (thin, 0.5 * height, 0.0), 0.5 * height + thin
     return [ball, stem]

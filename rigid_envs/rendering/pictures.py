@@ -35,6 +35,9 @@ class Pictures:
         show_forces: draw contact forces.
         show_particles: draw what touches in place of exact shapes.
         worlds: how many to draw at most.
+
+    Attributes:
+        camera: where to look from.
     """
 
     def __init__(
@@ -56,7 +59,8 @@ class Pictures:
         self._show_particles: bool = instance("show_particles", show_particles, bool)
         self._width = integer("width", width, low=LEAST, high=MOST)
         self._height = integer("height", height, low=LEAST, high=MOST)
-        self._camera = choose_camera(camera, runner.task.camera)
+        self.camera = choose_camera(camera, runner.task.camera)
+        self._floor = scene_view.floor(runner.world.scene).height
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)
         self._renderer: Renderer | None = None
         self._window: Window | None = None
@@ -93,7 +97,9 @@ class Pictures:
     def _draw(self, width: int, height: int) -> tuple[Array, ...]:
         if self._renderer is None:
             threads = self._runner.world.threads
-            self._renderer = Renderer(width, height, self._camera, threads=threads)
+            self._renderer = Renderer(
+                width, height, self.camera, floor=self._floor, threads=threads
+            )
         worlds = np.arange(self._count)
         items = scene_view.items(self._runner, worlds, particles=self._show_particles)
         overlays = [self._renderer.overlay(*self._beside(world)) for world in range(self._count)]

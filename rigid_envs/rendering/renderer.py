@@ -1,17 +1,18 @@
 """A software renderer: colours, depths and solids of pictures of many worlds, without a display.
 
-Every solid is cut with the rays of the pixels that it may cover, so that pictures are exact: there
-are no polygons and no textures. What there is to see is in `view`.
+Every solid is cut with the rays of the pixels that it may cover, so that pictures are exact: round
+solids are not cut into polygons. What there is to see is in `view`.
 """
 
 import threading
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from physics.rotation import rotation_matrix
-from physics.scene.validation import integer
+from physics.scene.validation import instance, integer, number
 from physics.step.threads import run_in_blocks
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.ground import ground
@@ -56,10 +57,12 @@ class Renderer:
         camera: where to look from; by default a square of 30 cm about the origin fills the picture.
         smooth: whether borders are smoothed.
         soft: whether shadows are, which takes longer where many solids hang high.
+        floor: m, height of the ground; None if there is none.
         threads: largest number of threads for pictures of many worlds.
 
     Raises:
-        ValueError: a size out of its range.
+        TypeError: a value of another type.
+        ValueError: a size out of its range, or a camera that is not above the ground.
     """
 
     def __init__(
@@ -70,20 +73,35 @@ class Renderer:
         *,
         smooth: bool = True,
         soft: bool = True,
+        floor: float | None = 0.0,
         threads: int = 1,
     ) -> None:
         self.width = integer("width", width, low=1, high=LARGEST)
         self.height = integer("height", height, low=1, high=LARGEST)
-        self.camera, self.smooth, self.soft = camera or Camera(), smooth, soft
+        self.camera: Camera = instance("camera", camera or Camera(), Camera)
+        self.smooth: bool = instance("smooth", smooth, bool)
+        self.soft: bool = instance("soft", soft, bool)
+        self.floor = None if floor is None else number("floor", floor)
         self.threads = integer("threads", threads, low=1)
+        if self.floor is not None and self.camera.eye[2] <= self.floor:
+            raise ValueError(
+                f"camera must be above the ground at z = {self.floor:g} m, got a position of "
+                f"{self.camera.position}"
+            )
+        self._below = np.array([0.0, 0.0, self.floor or 0.0])  # kernels have the ground at z = 0
         self._points = sun_points(SOFT if soft else 1)
-        self._view = self.camera.table(self.width, self.height)
+        self._view = self.camera.table(self.width, self.height, self._below[2])
         self._memory = threading.local()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Settings only."""
-        settings = (self.width, self.height, self.camera, self.smooth, self.soft, self.threads)
-        return _renderer, settings
+        settings = (self.smooth, self.soft, self.floor, self.threads)
+        return _renderer, (self.width, self.height, self.camera, *settings)
+
+    @cached_property
+    def _ground(self) -> tuple[Array, Array]:
+        """Colours and depths of the empty ground."""
+        return ground(self.camera, self.width, self.height, self.floor)
 
     def frame(
         self, items: Sequence[Item], *, markers: Sequence[Marker] = (), forces: Sequence[Arrow] = ()
@@ -101,7 +119,8 @@ class Renderer:
 
     def overlay(self, markers: Sequence[Marker], forces: Sequence[Arrow] = ()) -> Overlay:
         """Markers and forces of a world, as `frames` takes them."""
-        return overlay(markers, forces, self.camera, self.width, self.height)
+        floor = float(self._below[2])
+        return overlay(markers, forces, self.camera, self.width, self.height, floor)
 
     def frames(
         self,
@@ -126,19 +145,26 @@ class Renderer:
             depth: whether depths are wanted.
             solid: whether the indices of the solids that are seen are wanted.
             ground_solid: index of the ground.
+
+        Raises:
+            ValueError: no worlds, or overlays that are neither none nor one a world.
         """
-        size = (self.height, self.width)
+        size, worlds = (self.height, self.width), integer("worlds", worlds, low=1)
         solids, faint = self._tables(items, worlds)
         if primitives is not None:
             solids = np.concatenate([solids, primitives], axis=1)
         glass, decals, polygons = stacked(overlays, worlds)
         glass = np.concatenate([faint, glass], axis=1)
+        far = np.linalg.norm(glass["position"] - self.camera.eye, axis=2)
+        order = np.argsort(-far, axis=1, kind="stable")  # far ones first
+        glass = np.take_along_axis(glass, order, axis=1)
+        for table in (solids, glass):
+            table["position"] -= self._below
         colors = np.empty((worlds if rgb else 0, *size, 3), np.uint8)
         depths = np.empty((worlds if depth else 0, *size), np.float32)
         indices = np.empty((worlds if solid else 0, *size), np.int32)
-        tiles, tile_depth = ground(self.camera, self.width, self.height)
+        tiles, tile_depth = self._ground
         kernel = make_draw()
-
         order = np.argsort(-(solids["position"] @ TO_SUN), axis=1, kind="stable")
 
         def run(first: int, last: int) -> int:
@@ -196,9 +222,9 @@ class Renderer:
 
 
 def _renderer(
-    width: int, height: int, camera: Camera, smooth: bool, soft: bool, threads: int
+    width: int, height: int, camera: Camera, smooth: bool, soft: bool, floor: float, threads: int
 ) -> Renderer:
-    return Renderer(width, height, camera, smooth=smooth, soft=soft, threads=threads)
+    return Renderer(width, height, camera, smooth=smooth, soft=soft, floor=floor, threads=threads)
 
 
 def grid(frames: Sequence[Array], columns: int | None = None) -> Array:

@@ -1,10 +1,10 @@
 """What a world looks like: its solids, goal and contact forces as items that a renderer draws."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from physics import Box, Capsule, Gripper, Sphere, Static
+from physics import Box, Capsule, Gripper, Ground, Scene, Sphere, Static
 from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
 
 if TYPE_CHECKING:
@@ -24,6 +24,24 @@ STEM, SLENDER = 0.12, 0.55
 # how far it reaches beyond the fingers, half the bar's height, half the length of the post on it,
 # and the least distance of fingers that the bar is made for
 THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
+
+
+class Floor(NamedTuple):
+    """The ground of a scene: its height in m and its index as a solid."""
+
+    height: float | None
+    solid: int
+
+
+def floor(scene: Scene) -> Floor:
+    """The ground of a scene, the highest if there are several; without one, (None, -1)."""
+    first = len(scene.bodies) + len(scene.driven_bodies)
+    grounds = [
+        Floor(static.height, first + i)
+        for i, static in enumerate(scene.statics)
+        if isinstance(static, Ground)
+    ]
+    return max(grounds, default=Floor(None, -1), key=lambda ground: ground.height or 0.0)
 
 
 def items(runner: "Runner", worlds: Array, *, particles: bool = False) -> list[Item]:

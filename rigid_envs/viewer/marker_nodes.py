@@ -70,7 +70,7 @@ class MarkerNodes:
                 row = np.concatenate([position + place, size])
                 found.setdefault((kind, marker.color), []).append(row)
             if isinstance(marker, Ghost):
-                corners = box_corners(marker.position + place, np.eye(3), marker.half_extents)
+                corners = box_corners(marker.position + place, marker.half_extents)
                 edges.append(corners[list(EDGES)].reshape(-1, 2, 3))
                 colors.append(np.broadcast_to(np.array(marker.color), (len(EDGES) // 2, 2, 3)))
         for key in [key for key in self._nodes if key not in found]:

@@ -80,7 +80,8 @@ class Game:
         """Starts the first episode of a seed, or the next episode."""
         observation, info = self.env.reset(seed=seed)
         names = [bound[0] for bound in self._task.bounds]
-        opening = observation["observation"][names.index("opening")] if "opening" in names else 1.0
+        state = observation.get("state", observation["observation"])
+        opening = state[names.index("opening")] if "opening" in names else 1.0
         self.closed = bool(opening < HOLDING_OPENING)
         self.steps, self.reward, self.total = 0, 0.0, 0.0
         self.solved = bool(info["is_success"])
@@ -98,7 +99,7 @@ class Game:
 
     def step(self) -> None:
         """Advances by a step; starts the next episode at the end of one."""
-        azimuth = self._task.camera.azimuth
+        azimuth = self.env.unwrapped.camera.azimuth
         action = action_of(self.held, self._components, closed=self.closed, azimuth=azimuth)
         _, reward, terminated, truncated, info = self.env.step(action)
         self.steps, self.reward, self.total = self.steps + 1, reward, self.total + reward
@@ -130,6 +131,8 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
     Raises:
         UsageError: The id or an argument is invalid, or there is no display.
     """
+    if env_kwargs.get("obs_type", "state") == "pixels":
+        raise UsageError('play needs the state: obs_type must be "state" or "pixels+state"')
     arguments = {"max_episode_steps": -1, "width": SIZE, "height": SIZE, **env_kwargs}
     env = make_single_env(env_id, render_mode="rgb_array", **arguments)
     width, height, played = arguments["width"], arguments["height"], 0

@@ -63,8 +63,9 @@ def run(
         seconds: s of simulated time.
         seed: of what is random in it.
         threads: all cores if None.
-        video: the mp4 or GIF to write, 25 frames for each simulated second; none if None.
-        size: width and height of a frame of an mp4 in pixels.
+        video: the mp4 or GIF to write, with 25 frames for each simulated second, of which a GIF
+            keeps every second one; none if None.
+        size: width and height of a frame in pixels.
 
     Raises:
         UsageError: no such scene, more bodies than memory can hold, or a video that can't be
@@ -122,7 +123,10 @@ def _film(world: World, video: Path | None, size: int, fps: float) -> "Film | No
         return None
     from training.results.film import Film
 
-    return Film(world, video, fps, size)
+    try:
+        return Film(world, video, fps, size)
+    except ValueError as error:
+        raise UsageError(f"--size: {error}") from None
 
 
 def _show(world: World, steps: int, wall: float, seconds: float) -> None:

@@ -1,6 +1,5 @@
 """The header of a policy file: its fields, and a reader that validates every value."""
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

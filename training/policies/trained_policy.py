@@ -38,8 +38,8 @@ def trained_policy(
     the standard deviation. Loading them can run any code that they contain.
 
     Args:
-        path: A run folder, a .safetensors file or the folder of one, or a model.zip with statistics and
-            settings in the same folder.
+        path: A run folder, a .safetensors file or the folder of one, or a model.zip with
+            statistics and settings in the same folder.
         algo: Algorithm; required only for a model.zip outside a run folder.
         env_id: Environment id; required only for a model.zip outside a run folder, otherwise it
             replaces the one of training.

@@ -24,12 +24,13 @@ class Film:
 
     Raises:
         UsageError: another kind of file, or one that can't be written.
+        ValueError: a size out of its range.
     """
 
     def __init__(self, world: World, path: Path, fps: float, size: int) -> None:
         self.path, self.count, self.seconds = path, 0, 0.0
+        self._crowd = Crowd(world, size)
         self._writer = video_writer(path, fps, gif_width=size)
-        self._crowd = Crowd(world, size, size)
         self.add()
         self.seconds = 0.0  # the first frame compiles
 

@@ -68,7 +68,7 @@ def ray_and_tube(ox, oy, ex, ey, radius):
 @stage
 def ray_and_capsule(ox, oy, oz, ex, ey, ez, radius, half_length):
     """Points within `radius` of the segment |z| <= half_length: a tube, or the ball at an end."""
-    low, high = ray_and_tube(ox, oy, ex, ey, radius)
+    low, _ = ray_and_tube(ox, oy, ex, ey, radius)
     t, z = low, oz + low * ez
     if not (abs(z) <= half_length):
         # the end that the ray passes first, then the other one
@@ -76,7 +76,8 @@ def ray_and_capsule(ox, oy, oz, ex, ey, ez, radius, half_length):
         for side in (-1.0, 1.0):
             at, _, _, _ = ray_and_sphere(ox, oy, oz - side * half_length, ex, ey, ez, radius)
             t = min(t, at)
-    inside = (low < 0.0) & (high > 0.0) & (abs(oz) <= half_length)
+    end = oz - min(max(oz, -half_length), half_length)
+    inside = ox * ox + oy * oy + end * end <= radius * radius
     t = 0.0 if inside else (t if t >= 0.0 else math.inf)
     x, y, z = ox + t * ex, oy + t * ey, oz + t * ez
     z -= min(max(z, -half_length), half_length)

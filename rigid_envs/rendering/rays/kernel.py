@@ -28,7 +28,7 @@ def make_draw() -> Any:
         polygons: [worlds, p], of POLYGON.
         camera: [1], of CAMERA.
         sun_frame: [3, 3], rows are two unit vectors across the light, and the one to the sun.
-        points: [samples, 3], directions to points of the sun; none: no shadows.
+        points: [samples, 3], directions to points of the sun.
         tiles: [rows, columns, 3], picture of the empty ground.
         tile_depth: [rows, columns] m, its depth; infinite above the horizon.
         smooths: whether borders are smoothed.
@@ -57,13 +57,12 @@ def make_draw() -> Any:
                     depth[row, column] = tile_depth[row, column]
                     shown[row, column] = -1
                     hidden[row, column] = 0
-            bounds = find_nearest(primitives[w], view, depth, shown)
+            borders = find_nearest(primitives[w], view, depth, shown)
             if rgb.shape[0] > 0:
-                if samples > 0:
-                    find_shadows(
-                        primitives[w], order[w], view, sun_frame, points, depth, shown, starts,
-                        entries, hidden,
-                    )  # fmt: skip
+                find_shadows(
+                    primitives[w], order[w], view, sun_frame, points, depth, shown, starts,
+                    entries, hidden,
+                )  # fmt: skip
                 for row in range(rows):
                     for column in range(columns):
                         for k in range(3):
@@ -72,7 +71,7 @@ def make_draw() -> Any:
                 paint(primitives[w], view, sun, samples, shown, hidden, ground, rgb[w])
                 if smooths:
                     smooth(
-                        primitives[w], view, sun, samples, shown, hidden, ground, around, bounds,
+                        primitives[w], view, sun, samples, shown, hidden, ground, around, borders,
                         rgb[w],
                     )  # fmt: skip
                 draw_glass(glass[w], view, sun, depth, rgb[w])

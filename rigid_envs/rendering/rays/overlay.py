@@ -5,7 +5,13 @@ import math
 from physics.compiler.jit import stage
 from rigid_envs.rendering.rays.intersections import SPHERE, intersection
 from rigid_envs.rendering.rays.light import brightness
-from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
+from rigid_envs.rendering.rays.visibility import (
+    bounds,
+    seen_from,
+    sight,
+    turned_into,
+    turned_out_of,
+)
 
 RIM = 0.55  # opacity that a see-through ball has at its rim, beside its own
 LOOKS = 4  # per pixel and direction at the border of a decal
@@ -80,10 +86,7 @@ def draw_glass(glass, camera, sun, depth, rgb):
                         p.kind, p.size[0], p.size[1], p.size[2], ox, oy, oz, ex, ey, ez
                     )
                     if (t < depth[row, column]) & (t > camera.near):
-                        A = p.axes
-                        nx = A[0, 0] * lx + A[1, 0] * ly + A[2, 0] * lz
-                        ny = A[0, 1] * lx + A[1, 1] * ly + A[2, 1] * lz
-                        nz = A[0, 2] * lx + A[1, 2] * ly + A[2, 2] * lz
+                        nx, ny, nz = turned_out_of(p, lx, ly, lz)
                         d, s = brightness(nx, ny, nz, dx, dy, dz, sun, 1.0, p.gloss)
                         length = math.sqrt(dx * dx + dy * dy + dz * dz)
                         seen, diffuse, shine = seen + 1, diffuse + d, shine + s

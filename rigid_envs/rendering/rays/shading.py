@@ -5,7 +5,7 @@ import math
 from physics.compiler.jit import stage
 from rigid_envs.rendering.rays.intersections import BOX, intersection
 from rigid_envs.rendering.rays.light import GROUND_SHADOW, brightness, sunlit
-from rigid_envs.rendering.rays.visibility import seen_from, sight, turned_into
+from rigid_envs.rendering.rays.visibility import seen_from, sight, turned_into, turned_out_of
 
 EDGE_WIDTH = 1.0  # pixels of a box's edge on each face
 
@@ -19,10 +19,7 @@ def surface(p, camera, sun, lit, dx, dy, dz):
     t, lx, ly, lz = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
     if t == math.inf:
         return t, 0.0, 0.0, 0.0
-    A = p.axes
-    nx = A[0, 0] * lx + A[1, 0] * ly + A[2, 0] * lz
-    ny = A[0, 1] * lx + A[1, 1] * ly + A[2, 1] * lz
-    nz = A[0, 2] * lx + A[1, 2] * ly + A[2, 2] * lz
+    nx, ny, nz = turned_out_of(p, lx, ly, lz)
     diffuse, shine = brightness(nx, ny, nz, dx, dy, dz, sun, lit, p.gloss)
     if p.kind == BOX and p.edge < 1.0:
         # how far the point is from the nearest edge of its face
@@ -95,18 +92,18 @@ _LOOKS = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
 
 
 @stage
-def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, bounds, rgb):
+def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, borders, rgb):
     """Colours the pixels at borders again, as the mean of four looks at each.
 
     A pixel at a border shows what its neighbours show: the nearest of these primitives is sought at
     each of the four places. Their share of the sun is that of the neighbour.
 
     The arguments are those of `paint`; and `around` [9, 2] is working memory: what the neighbours
-    show, and which points of the sun are hidden there; `bounds`: first and last row and column
+    show, and which points of the sun are hidden there; `borders`: first and last row and column
     (exclusive) of the solids.
     """
     rows, columns = shown.shape
-    top, bottom, left, right = bounds
+    top, bottom, left, right = borders
     for row in range(max(top - 1, 0), min(bottom + 1, rows)):
         above, below = max(row - 1, 0), min(row + 1, rows - 1)
         for column in range(max(left - 1, 0), min(right + 1, columns)):
@@ -132,7 +129,8 @@ def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, boun
             red, green, blue = 0.0, 0.0, 0.0
             for down, across in _LOOKS:
                 dx, dy, dz = sight(camera, row + down, column + across)
-                best, nearest = -1, math.inf
+                # the ground hides what is below it
+                best, nearest = -1, -camera.eye[2] / dz if dz < 0.0 else math.inf
                 for k in range(count):
                     t = distance(primitives[around[k, 0]], camera, dx, dy, dz)
                     if (t < nearest) & (t > camera.near):

@@ -13,13 +13,16 @@ from rigid_envs.rendering.rays.light import SUN_SIZE
 from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
 
 MOST_CELLS = 256  # along one side of the grid
-_SELF = 1e-4  # of its reach, how far from itself a hollow solid can hide the sun
+# of its reach, how far from a surface a solid begins to hide the sun: nearer, rounding would decide
+_CLOSE = 1e-4
+_ASLANT = 1.002  # rays to the sun's rim pass a sphere's middle by so much farther
+_STRAY = 8.0  # mean distances from the mean place, beyond which bodies don't stretch the grid
 
 
 @stage
 def _shadow_radius(p, sun, spread):
     """m, of a disc across the light that holds a primitive's shadow, down to the ground."""
-    return p.reach + spread * max(p.position[2] + p.reach, 0.0) / sun[2]
+    return _ASLANT * p.reach + spread * max(p.position[2] + p.reach, 0.0) / sun[2]
 
 
 @stage
@@ -47,6 +50,7 @@ def sort_into_cells(primitives, order, frame, spread, starts, entries):
     """Lists the primitives of every cell, those nearest to the sun first.
 
     The grid has about as many cells as there are primitives, or fewer if the lists would not fit.
+    It leaves out the few that may be far from all others.
 
     Args:
         primitives: [n], of PRIMITIVE.
@@ -59,14 +63,24 @@ def sort_into_cells(primitives, order, frame, spread, starts, entries):
     Returns:
         (left, bottom, cell, side): corner of the grid and width of a cell in m, cells along a side.
     """
-    left, right, bottom, top = math.inf, -math.inf, math.inf, -math.inf
-    sun = frame[2]
-    for n in range(len(primitives)):
+    sun, count = frame[2], len(primitives)
+    middle_u, middle_v, apart = 0.0, 0.0, 0.0
+    for n in range(count):
+        p = primitives[n].position
+        u, v = _across(frame, p[0], p[1], p[2])
+        middle_u, middle_v = middle_u + u / count, middle_v + v / count
+    for n in range(count):
+        p = primitives[n].position
+        u, v = _across(frame, p[0], p[1], p[2])
+        apart += max(abs(u - middle_u), abs(v - middle_v)) / count
+    left, right, bottom, top = middle_u, middle_u, middle_v, middle_v
+    for n in range(count):
         p = primitives[n]
         u, v = _across(frame, p.position[0], p.position[1], p.position[2])
-        radius = _shadow_radius(p, sun, spread)
-        left, right = min(left, u - radius), max(right, u + radius)
-        bottom, top = min(bottom, v - radius), max(top, v + radius)
+        if max(abs(u - middle_u), abs(v - middle_v)) <= _STRAY * apart:
+            radius = _shadow_radius(p, sun, spread)
+            left, right = min(left, u - radius), max(right, u + radius)
+            bottom, top = min(bottom, v - radius), max(top, v + radius)
     width = max(right - left, top - bottom)
     side = min(max(math.ceil(math.sqrt(len(primitives))), 1), MOST_CELLS)
     while True:
@@ -175,22 +189,22 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
                 if way < -largest:
                     break  # this one and all that follow are behind the point
                 hollow = (p.kind == TRIANGLE) | (p.kind == TORUS)
-                room = p.reach + spread * max(way, 0.0)
+                room = _ASLANT * p.reach + spread * max(way, 0.0)
                 aside = vx * vx + vy * vy + vz * vz - way * way
                 itself = (own == entries[k]) & (not hollow)
                 if itself | (way < -p.reach) | (aside > room * room):
                     continue
-                found |= _hidden_by(p, x, y, z, points, hollow)
+                found |= _hidden_by(p, x, y, z, points)
                 if found == every:
                     break
             hidden[row, column] = found
 
 
 @stage
-def _hidden_by(p, x, y, z, points, hollow):
+def _hidden_by(p, x, y, z, points):
     """Bits of the points of the sun that a primitive hides from a point of a surface."""
     ox, oy, oz = seen_from(p, x, y, z)
-    least, found = _SELF * p.reach if hollow else 0.0, 0
+    least, found = _CLOSE * p.reach, 0
     for s in range(len(points)):
         ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
         at, _, _, _ = intersection(

@@ -36,13 +36,8 @@ def bounds(camera, x, y, z, radius, rows, columns):
 @stage
 def seen_from(primitive, x, y, z):
     """A point of the world in a primitive's frame."""
-    p, A = primitive.position, primitive.axes
-    x, y, z = x - p[0], y - p[1], z - p[2]
-    return (
-        A[0, 0] * x + A[0, 1] * y + A[0, 2] * z,
-        A[1, 0] * x + A[1, 1] * y + A[1, 2] * z,
-        A[2, 0] * x + A[2, 1] * y + A[2, 2] * z,
-    )
+    p = primitive.position
+    return turned_into(primitive, x - p[0], y - p[1], z - p[2])
 
 
 @stage
@@ -53,6 +48,17 @@ def turned_into(primitive, x, y, z):
         A[0, 0] * x + A[0, 1] * y + A[0, 2] * z,
         A[1, 0] * x + A[1, 1] * y + A[1, 2] * z,
         A[2, 0] * x + A[2, 1] * y + A[2, 2] * z,
+    )
+
+
+@stage
+def turned_out_of(primitive, x, y, z):
+    """A direction of a primitive's frame in the world."""
+    A = primitive.axes
+    return (
+        A[0, 0] * x + A[1, 0] * y + A[2, 0] * z,
+        A[0, 1] * x + A[1, 1] * y + A[2, 1] * z,
+        A[0, 2] * x + A[1, 2] * y + A[2, 2] * z,
     )
 
 

@@ -113,6 +113,27 @@ def test_an_episode_with_a_stack_continues_from_its_state():
     np.testing.assert_array_equal(one["observation"], two["observation"])
 
 
+def test_a_state_of_other_pixels_is_refused_before_anything_changes():
+    small, large = make(**SMALL), make(**{**SMALL, "pixel_size": 48})
+    for env in (small, large):
+        env.reset(seed=0)
+    small.step(np.ones(3))
+    before = large._runner.world.position.copy()
+    with pytest.raises(ValueError, match=r"shape \(1, 48, 48, 3\).*got \(1, 32, 32, 3\)"):
+        large.set_state(small.get_state())
+    np.testing.assert_array_equal(large._runner.world.position, before)
+
+
+def test_new_parameters_are_seen_at_once_and_do_not_count_as_a_step():
+    env = make(**SMALL, frame_stack=2, randomize={"size": (1.0, 1.0)})
+    env.reset(seed=0)
+    before = env.step(np.ones(3))[0]["observation"]
+    env._runner.change_ranges({"size": (2.0, 2.0)})
+    after = env._runner.observe()[0]["observation"][0]
+    np.testing.assert_array_equal(after[..., :3], before[..., :3])
+    assert (after[..., 3:] != before[..., 3:]).any()
+
+
 def test_a_camera_is_chosen_for_pixels_too():
     above, side = (make(**SMALL, camera=name).reset(seed=0)[0] for name in ("top", "side"))
     assert (above["observation"] != side["observation"]).any()
@@ -124,6 +145,7 @@ def test_a_camera_is_chosen_for_pixels_too():
         ({"obs_type": "pixel"}, "obs_type"),
         ({"pixels": "rgbd"}, "pixels"),
         ({"pixels": ()}, "at least one kind"),
+        ({"obs_type": "state", "pixel_size": 84, "pixels": "depth"}, "pixels=.* needs obs_type"),
         ({"pixels": ("rgb", "rgb")}, "none twice"),
         ({"pixel_size": 4}, "pixel_size must be at least 8, got 4"),
         ({"pixel_size": (84, 84, 3)}, r"number or \(width, height\)"),

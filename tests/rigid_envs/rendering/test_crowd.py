@@ -14,7 +14,7 @@ from rigid_envs.rendering.view import Item
 def test_bodies_are_drawn_as_items_would_be():
     scene, fidelity = SCENES["rubble"](60, 0)
     world = World(scene, fidelity)
-    crowd = Crowd(world, 96, 96)
+    crowd = Crowd(world, 96)
     world.advance(0.02)
     items = [
         Item(body.shape, world.position[0, i], world.orientation[0, i], tuple(crowd._colors[i]))

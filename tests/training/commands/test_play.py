@@ -187,6 +187,24 @@ def test_keys_reach_the_environment(keyboard):
     assert steps == ["0", "1", "2", "1", "2"]
 
 
+def test_keys_follow_the_chosen_camera():
+    moved = []
+    for camera in ("front", "back"):
+        env = make_single_env(PUSH, fidelity="fast", camera=camera)
+        played, world = Game(env, 0), env.unwrapped._runner.world
+        start = world.drive_position[0, 0].copy()
+        played.press([Key("right", True)])
+        played.step()
+        moved.append(world.drive_position[0, 0] - start)
+    assert moved[0][0] > 1e-4
+    np.testing.assert_allclose(moved[0][:2], -moved[1][:2], atol=1e-9)
+
+
+def test_pixels_alone_cannot_be_played():
+    with pytest.raises(UsageError, match='obs_type must be "state"'):
+        play(PUSH, seed=0, obs_type="pixels", **SMALL)
+
+
 def test_episodes_have_no_step_limit_by_default(keyboard):
     keyboard[60] = [down(pygame.K_ESCAPE)]
     play(PUSH, seed=0, **SMALL)

@@ -94,3 +94,10 @@ def test_a_video_that_cannot_be_written_is_named_before_anything_runs(video, mes
     shown = capsys.readouterr()
     assert re.search(message, shown.err)
     assert "simulated" not in shown.out
+
+
+def test_a_video_that_is_too_large_is_refused(capsys, tmp_path):
+    words = ["scene", "heap", "--bodies", "40", "--video", str(tmp_path / "x.mp4")]
+    assert main([*words, "--size", "5000"]) == 2
+    assert "--size: width must be at most 4096, got 5000" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
