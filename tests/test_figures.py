@@ -5,9 +5,10 @@ import pytest
 from PIL import Image
 
 from benchmarks.draw.figure import DIGEST, digest
+from benchmarks.draw.tasks import STRIPS
 from benchmarks.measure.commits import difference
 from benchmarks.pages import PAGES, page_text
-from benchmarks.plots import PLOTS, TASKS
+from benchmarks.plots import FILM, PLOTS, SCENES
 from benchmarks.report.results_file import load, save
 from benchmarks.report.tables import Table
 from benchmarks.stability.__main__ import load as cells
@@ -29,8 +30,10 @@ def test_a_plot_shows_the_saved_table(name):
 
 
 def test_pictures_are_small():
-    for path in (TASKS, *(plot.path for plot in PLOTS.values())):
-        assert path.stat().st_size <= 300_000
+    strips = [FILM.parent / f"{name}.png" for name in STRIPS]
+    for path in (SCENES, *strips, *(plot.path for plot in PLOTS.values())):
+        assert path.stat().st_size <= 300_000, path
+    assert FILM.stat().st_size <= 1_500_000
 
 
 def test_the_readme_is_short():

@@ -48,7 +48,7 @@ class Crowd:
         position, turn = world.position[0], rotation_matrix(world.orientation[0])
         tables = []
         for local, own in self._kinds:
-            table = placed(local, position[own], turn[own])
+            table = placed(local, position[own][:, None], turn[own][:, None])
             table["color"], table["solid"] = self._colors[own][:, None], own[:, None]
             tables.append(table.reshape(-1))
         others = [

@@ -69,31 +69,31 @@ def shape_primitives(shape: Any) -> Array:
 
 
 def placed(local: Array, position: Array, turn: Array, size: Array | float = 1.0) -> Array:
-    """Primitives [n] of a solid's frame at the solid's poses.
+    """Primitives [n] of solids' frames at the solids' poses.
 
     Args:
         local: [n], of PRIMITIVE.
-        position: [..., 3] m.
-        turn: [..., 3, 3], rotation matrices.
-        size: [...], by which the solid is larger than its shape.
+        position: [..., n or 1, 3] m, of the solid of each.
+        turn: [..., n or 1, 3, 3], rotation matrices.
+        size: [..., n or 1], by which the solid is larger than its shape.
 
     Returns:
         [..., n].
     """
-    table = np.empty((*position.shape[:-1], len(local)), PRIMITIVE)
+    table = np.empty((*position.shape[:-2], len(local)), PRIMITIVE)
     table[...] = local
     factor = np.asarray(size)[..., None]
-    offset = np.einsum("...ij,nj->...ni", turn, local["position"])
-    table["position"] = position[..., None, :] + factor[..., None] * offset
-    table["axes"] = np.einsum("nkj,...ij->...nki", local["axes"], turn)
-    table["size"] *= factor[..., None]
-    table["reach"] *= factor
+    offset = (turn @ local["position"][:, :, None])[..., 0]
+    table["position"] = position + factor * offset
+    table["axes"] = local["axes"] @ np.swapaxes(turn, -1, -2)
+    table["size"] *= factor
+    table["reach"] *= factor[..., 0]
     return table
 
 
 def _part(part: Part) -> Array:
     place, turn = np.array(part.position), rotation_matrix(np.array(part.orientation))
-    return placed(shape_primitives(part.shape), place, turn)
+    return placed(shape_primitives(part.shape), place[None], turn[None])
 
 
 def _triangles(corners: Array) -> Array:

@@ -18,6 +18,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.ground import ground
 from rigid_envs.rendering.markers import Overlay, overlay, stacked
 from rigid_envs.rendering.primitives import balls, placed, shape_primitives
+from rigid_envs.rendering.rays.intersections import SPHERE
 from rigid_envs.rendering.rays.kernel import make_draw
 from rigid_envs.rendering.rays.light import SUN_FRAME, TO_SUN, sun_points
 from rigid_envs.rendering.rays.shadows import MOST_CELLS
@@ -181,30 +182,25 @@ class Renderer:
         )
 
     def _tables(self, items: Sequence[Item], worlds: int) -> tuple[Array, Array]:
-        """Primitives [worlds, n] of solids, and [worlds, g] of faint shapes around particles."""
-        solids, faint = [np.zeros((worlds, 0), PRIMITIVE)], [np.zeros((worlds, 0), PRIMITIVE)]
+        """Primitives [worlds, n] of solids, and [worlds, g] of those that are see-through."""
+        opaque: list[tuple[Item, Array]] = []
+        faint: list[tuple[Item, Array]] = []
         for item in items:
-            place = np.broadcast_to(item.position, (worlds, 3))
-            turn = rotation_matrix(np.broadcast_to(item.orientation, (worlds, 4)))
-            size = np.broadcast_to(item.size, worlds)
-            shape = placed(shape_primitives(item.shape), place, turn, size)
-            shape["color"], shape["solid"] = item.color, item.solid
-            if item.particles is None:
-                shape["opacity"] = item.opacity
-                (solids if item.opacity == 1.0 else faint).append(shape)
-                continue
-            shape["opacity"] = _FAINT
-            faint.append(shape)
-            samples = placed(
-                balls(item.particles.positions, item.particles.radius), place, turn, size
+            local = shape_primitives(item.shape).copy()
+            local["opacity"] = item.opacity if item.particles is None else _FAINT
+            (opaque if item.opacity == 1.0 and item.particles is None else faint).append(
+                (item, local)
             )
-            samples["color"], samples["solid"] = item.color, item.solid
-            depth = (samples["position"] - self.camera.eye) @ self.camera.axes[2]
+            if item.particles is not None:
+                opaque.append((item, balls(item.particles.positions, item.particles.radius)))
+        solids = _placed(opaque, worlds)
+        if any(item.particles is not None for item in items):
+            depth = (solids["position"] - self.camera.eye) @ self.camera.axes[2]
             least = _LEAST_BALL * np.maximum(depth, 0.0) * self._view["pixel"][0]
-            for field in (samples["size"][..., 0], samples["reach"]):
+            least *= solids["kind"] == SPHERE
+            for field in (solids["size"][..., 0], solids["reach"]):
                 np.maximum(field, least, out=field)
-            solids.append(samples)
-        return np.concatenate(solids, axis=1), np.concatenate(faint, axis=1)
+        return solids, _placed(faint, worlds)
 
     def _working_memory(self, count: int) -> tuple[Array, ...]:
         """Of this thread, for `count` primitives."""
@@ -219,6 +215,26 @@ class Renderer:
         if len(memory.entries) < listed:
             memory.entries = np.empty(listed, np.int32)
         return *memory.pixels, memory.entries
+
+
+def _placed(parts: list[tuple[Item, Array]], worlds: int) -> Array:
+    """Primitives [worlds, n] of items, of which each has its own in its frame."""
+    if not parts:
+        return np.zeros((worlds, 0), PRIMITIVE)
+    counts = [len(local) for _, local in parts]
+    local = np.concatenate([local for _, local in parts])
+    local["color"] = np.repeat([item.color for item, _ in parts], counts, axis=0)
+    local["solid"] = np.repeat([item.solid for item, _ in parts], counts)
+    position = _of_worlds([item.position for item, _ in parts], (worlds, 3))
+    turn = rotation_matrix(_of_worlds([item.orientation for item, _ in parts], (worlds, 4)))
+    size = _of_worlds([item.size for item, _ in parts], (worlds,))
+    which = np.repeat(np.arange(len(parts)), counts)
+    return placed(local, position[:, which], turn[:, which], size[:, which])
+
+
+def _of_worlds(values: Sequence[Any], shape: tuple[int, ...]) -> Array:
+    """[worlds, items, ...] of values that are those of all worlds, or of each."""
+    return np.stack([np.broadcast_to(value, shape) for value in values], axis=1)
 
 
 def _renderer(

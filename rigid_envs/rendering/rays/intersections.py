@@ -165,3 +165,29 @@ def intersection(kind, a, b, c, ox, oy, oz, ex, ey, ez):
     if kind == CYLINDER:
         return ray_and_cylinder(ox, oy, oz, ex, ey, ez, a, b)
     return ray_and_torus(ox, oy, oz, ex, ey, ez, a, b)
+
+
+@stage
+def grown(kind, a, b, c, by):
+    """The size of a solid shape that holds all points within a distance of one of that size."""
+    if kind == BOX:
+        return a + by, b + by, c + by
+    if kind == CYLINDER:
+        return a + by, b + by, c
+    if kind == TORUS:
+        return a, b + by, c
+    return a + by, b, c
+
+
+@stage
+def half_extents(kind, a, b, c):
+    """Of the box around a shape in its frame; not for a triangle, which lies beside its origin."""
+    if kind == BOX:
+        return a, b, c
+    if kind == CAPSULE:
+        return a, a, a + b
+    if kind == CYLINDER:
+        return a, a, b
+    if kind == TORUS:
+        return a + b, a + b, b
+    return a, a, a

@@ -8,11 +8,12 @@ from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
 from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import large_entry
 from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
-from rigid_envs.rendering.rays.shading import paint, smooth
+from rigid_envs.rendering.rays.shading import around_both, paint, smooth
 from rigid_envs.rendering.rays.shadows import find_shadows
 from rigid_envs.rendering.rays.visibility import find_nearest
 
-SOURCES = hash_sources(Path(__file__).parent)
+# of the engine's stages and of those of this folder
+SOURCES = ENGINE_SOURCES ^ hash_sources(Path(__file__).parent)
 
 
 @cache
@@ -40,7 +41,7 @@ def make_draw() -> Any:
         solids: [worlds, rows, columns], the solids that are seen; likewise.
         ground_solid: which solid the ground is, -1 if none.
     """
-    sources, engine = SOURCES, ENGINE_SOURCES
+    sources = SOURCES
 
     @large_entry
     def draw(
@@ -48,7 +49,7 @@ def make_draw() -> Any:
         tile_depth, smooths, depth, shown, hidden, ground, around, starts, entries, rgb, depths,
         solids, ground_solid,
     ):  # fmt: skip
-        _ = sources, engine
+        _ = sources
         rows, columns = depth.shape
         view, samples, sun = camera[0], len(points), sun_frame[2]
         for w in range(first, last):
@@ -59,19 +60,25 @@ def make_draw() -> Any:
                     hidden[row, column] = 0
             borders = find_nearest(primitives[w], view, depth, shown)
             if rgb.shape[0] > 0:
-                find_shadows(
+                shaded = find_shadows(
                     primitives[w], order[w], view, sun_frame, points, depth, shown, starts,
                     entries, hidden,
                 )  # fmt: skip
-                for row in range(rows):
-                    for column in range(columns):
-                        for k in range(3):
-                            ground[row, column, k] = tiles[row, column, k]
-                draw_decals(decals[w], view, ground)
-                paint(primitives[w], view, sun, samples, shown, hidden, ground, rgb[w])
+                below = tiles
+                if decals.shape[1] > 0:
+                    below = ground
+                    for row in range(rows):
+                        for column in range(columns):
+                            for k in range(3):
+                                ground[row, column, k] = tiles[row, column, k]
+                    draw_decals(decals[w], view, ground)
+                paint(
+                    primitives[w], view, sun, samples, shown, hidden, below,
+                    around_both(borders, shaded), rgb[w],
+                )  # fmt: skip
                 if smooths:
                     smooth(
-                        primitives[w], view, sun, samples, shown, hidden, ground, around, borders,
+                        primitives[w], view, sun, samples, shown, hidden, below, around, borders,
                         rgb[w],
                     )  # fmt: skip
                 draw_glass(glass[w], view, sun, depth, rgb[w])

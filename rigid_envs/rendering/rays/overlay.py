@@ -14,7 +14,7 @@ from rigid_envs.rendering.rays.visibility import (
 )
 
 RIM = 0.55  # opacity that a see-through ball has at its rim, beside its own
-LOOKS = 4  # per pixel and direction at the border of a decal
+LOOKS = 2  # per pixel and direction at a decal
 
 
 @stage
@@ -109,26 +109,53 @@ def draw_polygons(polygons, rgb):
     for n in range(len(polygons)):
         p = polygons[n]
         q = p.corners
-        low_x, high_x, low_y, high_y = q[0, 0], q[0, 0], q[0, 1], q[0, 1]
-        area = 0.0
+        low_y, high_y, area, inside = q[0, 1], q[0, 1], 0.0, True
         for k in range(4):
             m = (k + 1) % 4
-            low_x, high_x = min(low_x, q[k, 0]), max(high_x, q[k, 0])
             low_y, high_y = min(low_y, q[k, 1]), max(high_y, q[k, 1])
             area += q[k, 0] * q[m, 1] - q[m, 0] * q[k, 1]
-        if not ((low_x > -1e6) & (high_x < 1e6) & (low_y > -1e6) & (high_y < 1e6)):
+            inside &= (abs(q[k, 0]) < 1e6) & (abs(q[k, 1]) < 1e6)
+        if not inside:
             continue
         side = 1.0 if area > 0.0 else -1.0
         for row in range(max(math.floor(low_y) - 1, 0), min(math.ceil(high_y) + 1, rows)):
-            for column in range(max(math.floor(low_x) - 1, 0), min(math.ceil(high_x) + 1, columns)):
-                x, y, inside = column + 0.5, row + 0.5, 1e9
-                for k in range(4):
-                    m = (k + 1) % 4
-                    ux, uy = q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]
-                    length = math.sqrt(ux * ux + uy * uy)
-                    if length > 1e-9:
-                        gap = side * (ux * (y - q[k, 1]) - uy * (x - q[k, 0])) / length
-                        inside = min(inside, gap)
-                cover = min(max(inside + 0.5, 0.0), 1.0)
+            left, right = _reach(q, row - 0.5, row + 1.5)
+            for column in range(max(math.floor(left) - 1, 0), min(math.ceil(right) + 1, columns)):
+                cover = min(max(_within(q, column + 0.5, row + 0.5, side) + 0.5, 0.0), 1.0)
                 if cover > 0.0:
                     blend(rgb, row, column, p.color, 1.0, 0.0, cover * p.opacity)
+
+
+@stage
+def _reach(q, top, bottom):
+    """From where to where the edges of a polygon reach between two rows; empty if they don't."""
+    left, right = math.inf, -math.inf
+    for k in range(4):
+        m = (k + 1) % 4
+        ax, ay, bx, by = q[k, 0], q[k, 1], q[m, 0], q[m, 1]
+        if ay > by:
+            ax, ay, bx, by = bx, by, ax, ay
+        if (by < top) | (ay > bottom):
+            continue
+        slope = (bx - ax) / (by - ay) if by > ay else 0.0
+        first, last = ax, bx
+        if by > ay:
+            first = ax + slope * (max(ay, top) - ay)
+            last = ax + slope * (min(by, bottom) - ay)
+        left, right = min(left, min(first, last)), max(right, max(first, last))
+    if left > right:
+        return 0.0, -2.0
+    return left, right
+
+
+@stage
+def _within(q, x, y, side):
+    """How far a point is within a convex polygon, negative outside of it."""
+    inside = 1e9
+    for k in range(4):
+        m = (k + 1) % 4
+        ux, uy = q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]
+        length = math.sqrt(ux * ux + uy * uy)
+        if length > 1e-9:
+            inside = min(inside, side * (ux * (y - q[k, 1]) - uy * (x - q[k, 0])) / length)
+    return inside

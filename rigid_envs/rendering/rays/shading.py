@@ -52,7 +52,17 @@ def byte(value):
 
 
 @stage
-def paint(primitives, camera, sun, samples, shown, hidden, ground, rgb):
+def around_both(a, b):
+    """The rectangle around two, of which one may be empty."""
+    if (a[0] >= a[1]) | (a[2] >= a[3]):
+        return b
+    if (b[0] >= b[1]) | (b[2] >= b[3]):
+        return a
+    return min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
+
+
+@stage
+def paint(primitives, camera, sun, samples, shown, hidden, ground, borders, rgb):
     """Colours all pixels.
 
     Args:
@@ -63,17 +73,20 @@ def paint(primitives, camera, sun, samples, shown, hidden, ground, rgb):
         shown: [rows, columns], which primitive, or -1.
         hidden: [rows, columns], bits of the hidden points of the sun.
         ground: [rows, columns, 3], colours of the empty ground and the sky.
+        borders: first and last row and column (exclusive) of solids and shadows.
         rgb: [rows, columns, 3], is written.
     """
     rows, columns = shown.shape
     for row in range(rows):
         for column in range(columns):
+            for k in range(3):
+                rgb[row, column, k] = ground[row, column, k]
+    top, bottom, left, right = borders
+    for row in range(top, bottom):
+        for column in range(left, right):
             n = shown[row, column]
             if n < 0:
-                if hidden[row, column] == 0:
-                    for k in range(3):
-                        rgb[row, column, k] = ground[row, column, k]
-                else:
+                if hidden[row, column] != 0:
                     dark = 1.0 - sunlit(hidden[row, column], samples)
                     for k in range(3):
                         value = ground[row, column, k] * (1.0 - dark * GROUND_SHADOW[k])

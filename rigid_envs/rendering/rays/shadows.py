@@ -8,11 +8,12 @@ cell can hide.
 import math
 
 from physics.compiler.jit import stage
-from rigid_envs.rendering.rays.intersections import TORUS, TRIANGLE, intersection
+from rigid_envs.rendering.rays.intersections import TORUS, TRIANGLE, grown, intersection
 from rigid_envs.rendering.rays.light import SUN_SIZE
 from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
 
 MOST_CELLS = 256  # along one side of the grid
+CELLS = 3.0  # along one side, by the root of the number of primitives
 # of its reach, how far from a surface a solid begins to hide the sun: nearer, rounding would decide
 _CLOSE = 1e-4
 _ASLANT = 1.002  # rays to the sun's rim pass a sphere's middle by so much farther
@@ -49,7 +50,7 @@ def _cells_of(u, v, radius, left, bottom, cell, side):
 def sort_into_cells(primitives, order, frame, spread, starts, entries):
     """Lists the primitives of every cell, those nearest to the sun first.
 
-    The grid has about as many cells as there are primitives, or fewer if the lists would not fit.
+    The grid has several cells for each primitive, or fewer if the lists would not fit.
     It leaves out the few that may be far from all others.
 
     Args:
@@ -82,7 +83,7 @@ def sort_into_cells(primitives, order, frame, spread, starts, entries):
             left, right = min(left, u - radius), max(right, u + radius)
             bottom, top = min(bottom, v - radius), max(top, v + radius)
     width = max(right - left, top - bottom)
-    side = min(max(math.ceil(math.sqrt(len(primitives))), 1), MOST_CELLS)
+    side = min(math.ceil(CELLS * math.sqrt(len(primitives))), MOST_CELLS)
     while True:
         cell = width / side
         for k in range(side * side + 1):
@@ -160,9 +161,12 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
         starts: [MOST_CELLS^2 + 1], working memory.
         entries: [at least n], working memory.
         hidden: [rows, columns], of a bit for each sample; at first 0.
+
+    Returns:
+        First and last row and column (exclusive) of what was changed.
     """
     if len(primitives) == 0:
-        return
+        return 0, 0, 0, 0
     spread = SUN_SIZE if len(points) > 1 else 0.0
     sun, every, largest = frame[2], (1 << len(points)) - 1, 0.0
     for n in range(len(primitives)):
@@ -170,17 +174,27 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
     left, low, cell, side = sort_into_cells(primitives, order, frame, spread, starts, entries)
     rows, columns = depth.shape
     top, bottom, first, last = shaded_pixels(primitives, camera, sun, spread, rows, columns)
+    per_cell = 1.0 / cell
+    ex, ey, ez = camera.eye[0], camera.eye[1], camera.eye[2]
+    eye_u, eye_v = _across(frame, ex, ey, ez)
+    across_u, across_v = _across(frame, camera.axes[0, 0], camera.axes[0, 1], camera.axes[0, 2])
     for row in range(top, bottom):
+        # a pixel's place across the light is linear in its column and its depth
+        dx, dy, dz = sight(camera, row + 0.5, camera.half_width)
+        row_u, row_v = _across(frame, dx, dy, dz)
         for column in range(first, last):
             t = depth[row, column]
             if t == math.inf:
                 continue
-            dx, dy, dz = sight(camera, row + 0.5, column + 0.5)
-            x, y, z = camera.eye[0] + t * dx, camera.eye[1] + t * dy, camera.eye[2] + t * dz
-            u, v = _across(frame, x, y, z)
-            a, b = math.floor((u - left) / cell), math.floor((v - low) / cell)
+            aside = (column + 0.5 - camera.half_width) * camera.pixel
+            u, v = eye_u + t * (row_u + aside * across_u), eye_v + t * (row_v + aside * across_v)
+            a, b = math.floor((u - left) * per_cell), math.floor((v - low) * per_cell)
             if (a < 0) | (b < 0) | (a >= side) | (b >= side):
                 continue
+            if starts[b * side + a] == starts[b * side + a + 1]:
+                continue
+            dx, dy, dz = sight(camera, row + 0.5, column + 0.5)
+            x, y, z = ex + t * dx, ey + t * dy, ez + t * dz
             own, found = shown[row, column], 0
             for k in range(starts[b * side + a], starts[b * side + a + 1]):
                 p = primitives[entries[k]]
@@ -194,17 +208,28 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
                 itself = (own == entries[k]) & (not hollow)
                 if itself | (way < -p.reach) | (aside > room * room):
                     continue
-                found |= _hidden_by(p, x, y, z, points)
+                found |= _hidden_by(p, x, y, z, points, sun, spread, max(way, 0.0))
                 if found == every:
                     break
             hidden[row, column] = found
+    return top, bottom, first, last
 
 
 @stage
-def _hidden_by(p, x, y, z, points):
-    """Bits of the points of the sun that a primitive hides from a point of a surface."""
+def _hidden_by(p, x, y, z, points, sun, spread, way):
+    """Bits of the points of the sun that a primitive hides from a point of a surface.
+
+    The rays to all points pass the primitive within `spread` times the distance of the middle one:
+    if that misses the primitive grown by so much, none is hidden.
+    """
     ox, oy, oz = seen_from(p, x, y, z)
     least, found = _CLOSE * p.reach, 0
+    if (spread > 0.0) & (p.kind != TRIANGLE):
+        ex, ey, ez = turned_into(p, sun[0], sun[1], sun[2])
+        a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], spread * (way + p.reach))
+        at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
+        if at == math.inf:
+            return found
     for s in range(len(points)):
         ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
         at, _, _, _ = intersection(

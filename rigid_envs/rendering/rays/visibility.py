@@ -3,7 +3,12 @@
 import math
 
 from physics.compiler.jit import stage
-from rigid_envs.rendering.rays.intersections import intersection
+from rigid_envs.rendering.rays.intersections import (
+    SPHERE,
+    TRIANGLE,
+    half_extents,
+    intersection,
+)
 
 
 @stage
@@ -76,6 +81,37 @@ def sight(camera, row, column):
 
 
 @stage
+def pixels_of(p, camera, rows, columns):
+    """First and last row and column (exclusive) of the pixels that a primitive may cover.
+
+    Those of the sphere around it, and of the box around it, which is tighter for slender shapes.
+    """
+    x, y, z = p.position[0], p.position[1], p.position[2]
+    top, bottom, left, right = bounds(camera, x, y, z, p.reach, rows, columns)
+    if (p.kind == SPHERE) | (p.kind == TRIANGLE):
+        return top, bottom, left, right
+    a, b, c = half_extents(p.kind, p.size[0], p.size[1], p.size[2])
+    low_u, high_u, low_v, high_v = math.inf, -math.inf, math.inf, -math.inf
+    A = camera.axes
+    for k in range(8):
+        ex, ey, ez = turned_out_of(p, a if k & 1 else -a, b if k & 2 else -b, c if k & 4 else -c)
+        ex, ey, ez = ex + x - camera.eye[0], ey + y - camera.eye[1], ez + z - camera.eye[2]
+        depth = A[2, 0] * ex + A[2, 1] * ey + A[2, 2] * ez
+        if depth < camera.near:
+            return top, bottom, left, right
+        scale = camera.focal / depth
+        u = camera.half_width + scale * (A[0, 0] * ex + A[0, 1] * ey + A[0, 2] * ez)
+        v = camera.half_height - scale * (A[1, 0] * ex + A[1, 1] * ey + A[1, 2] * ez)
+        low_u, high_u = min(low_u, u), max(high_u, u)
+        low_v, high_v = min(low_v, v), max(high_v, v)
+    # a sphere's pixels lie within the picture, so these are integers
+    return (
+        math.floor(max(low_v, top)), math.ceil(min(high_v, bottom)),
+        math.floor(max(low_u, left)), math.ceil(min(high_u, right)),
+    )  # fmt: skip
+
+
+@stage
 def find_nearest(primitives, camera, depth, shown):
     """The nearest primitive of every pixel.
 
@@ -93,9 +129,7 @@ def find_nearest(primitives, camera, depth, shown):
     A = camera.axes
     for n in range(len(primitives)):
         p = primitives[n]
-        top, bottom, left, right = bounds(
-            camera, p.position[0], p.position[1], p.position[2], p.reach, rows, columns
-        )
+        top, bottom, left, right = pixels_of(p, camera, rows, columns)
         if (top >= bottom) | (left >= right):
             continue
         first_row, last_row = min(first_row, top), max(last_row, bottom)

@@ -151,14 +151,13 @@ def test_an_edit_of_a_kernel_in_another_file_is_compiled(copied):
     assert run(FALL, cache, root) == [1.0, 0.0, height]
 
 
-def test_an_edit_of_any_file_changes_the_key_of_the_cache(tmp_path, monkeypatch):
+def test_an_edit_of_any_file_changes_the_key_of_the_cache(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(code_cache, "_PACKAGE", tmp_path / "physics")
-    keys = {code_cache._hash_sources()}
+    keys = {code_cache.hash_sources(tmp_path / "physics")}
     files = sorted((tmp_path / "physics").rglob("*.py"))
     for path in files:
         path.write_text(path.read_text() + "# edited\n")
-        keys.add(code_cache._hash_sources())
+        keys.add(code_cache.hash_sources(tmp_path / "physics"))
     assert len(keys) == len(files) + 1
 
 

@@ -10,6 +10,7 @@ from physics import Box, Capsule, Compound, Sphere
 from physics.rotation import from_yaw, rotate
 from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.renderer import Renderer
+from rigid_envs.rendering.view import Item
 from rigid_envs.tasks.block import BAR, HALF, STEM, Block
 from rigid_envs.tasks.push import MASS, POST_RADIUS, POSTS, RANGE, THRESHOLD
 from rigid_envs.tasks.rewards import distance
@@ -175,31 +176,25 @@ def test_a_picture_shows_bar_and_stem_where_they_are():
     env.reset(seed=0)
     yaw, place = 0.7, np.array([0.05, -0.03, T.height])
     env._runner.world.set_state(position=place, orientation=from_yaw(yaw))
-    bar, stem, *_ = found = scene_view.items(env._runner, 0)
+    block, *others = scene_view.items(env._runner, np.zeros(1, int))
     along = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    np.testing.assert_allclose(bar.position, place + 0.01 * along, atol=1e-12)
-    np.testing.assert_allclose(stem.position, place - 0.02 * along, atol=1e-12)
-    for item, half in ((bar, BAR), (stem, STEM)):
-        assert item.shape.half_extents == half
-        np.testing.assert_allclose(item.orientation, from_yaw(yaw), atol=1e-12)
-        assert item.color == bar.color
+    bar = Item(Box(BAR), place + 0.01 * along, from_yaw(yaw), block.color)
+    stem = Item(Box(STEM), place - 0.02 * along, from_yaw(yaw), block.color)
     renderer = Renderer(480, 480, env._runner.task.camera)
     markers = scene_view.markers(env._runner, 0)
-    np.testing.assert_array_equal(env.render(), renderer.frame(found, markers=markers))
+    # both boxes have one place in the picture of the block, whatever rounding does to their borders
+    apart = env.render() != renderer.frame([bar, stem, *others], markers=markers)
+    assert apart.any(axis=2).sum() < 20
     for item in (bar, stem):
-        others = [other for other in found if other is not item]
-        assert (env.render() != renderer.frame(others, markers=markers)).any(axis=2).sum() > 50
+        alone = renderer.frame([item, *others], markers=markers)
+        assert (env.render() != alone).any(axis=2).sum() > 50
 
 
-def test_a_picture_of_particles_shows_each_sample_once_beside_its_part():
+def test_a_picture_of_particles_shows_each_sample_once():
     env = make(block="t", render_mode="rgb_array", show_particles=True)
     env.reset(seed=0)
-    bar, stem, *_ = scene_view.items(env._runner, 0, particles=True)
+    block, *_ = scene_view.items(env._runner, np.zeros(1, int), particles=True)
     samples, radius = env._runner.world.samples(0)
-    counts = [len(item.particles.positions) for item in (bar, stem)]
-    assert sum(counts) == len(samples)
-    assert min(counts) > 10
-    for item, half in ((bar, BAR), (stem, STEM)):
-        assert np.all(np.abs(item.particles.positions) <= np.array(half) + 1e-9)
-        np.testing.assert_array_equal(item.particles.radius, radius)
+    np.testing.assert_array_equal(block.particles.positions, samples)
+    np.testing.assert_array_equal(block.particles.radius, radius)
     assert env.render().shape == (480, 480, 3)
