@@ -6,8 +6,10 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
-import rigid_envs  # noqa: F401  (registers the ids)
 from physics.tuning import tune as tuning
+from rigid_envs import RigidEnv, RigidVectorEnv
+from rigid_envs.episodes.arguments import argument_names
+from rigid_envs.tasks import Push, Stack, Throw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -43,10 +45,22 @@ def test_a_task_of_ones_own_takes_less_than_a_hundred_lines(capsys, tmp_path, mo
     assert len(task.splitlines()) < 100
 
 
-@pytest.mark.parametrize("task", ["push", "stack", "throw"])
-def test_the_observation_table_names_every_index_once(task):
-    text = (ROOT / "docs" / "environments" / f"{task}.md").read_text()
-    rows = re.findall(r"^\| (\d+)(?:–(\d+))? \|(?:[^|]*\|){3}$", text, re.MULTILINE)
-    listed = [i for first, last in rows for i in range(int(first), int(last or first) + 1)]
-    env = gym.make(f"RigidEnvs/{task.capitalize()}-v0")
-    assert listed == list(range(env.observation_space["observation"].shape[0]))
+@pytest.mark.parametrize("task", [Push(), Stack(2), Throw()], ids=lambda t: type(t).__name__)
+def test_the_observation_table_has_a_row_for_every_index(task):
+    text = (ROOT / "docs" / "environments" / f"{type(task).__name__.lower()}.md").read_text()
+    found = re.findall(r"^\| (\d+) \| ([^|]+) \| ([^|]*) \| (\S+) to (\S+) \|$", text, re.MULTILINE)
+    listed = [
+        (int(i), name, unit.strip(), *(float(v.replace("−", "-")) for v in limits))
+        for i, name, unit, *limits in found
+    ]
+    assert listed == [(i, *bound) for i, bound in enumerate(task.bounds)]
+
+
+@pytest.mark.parametrize("task", [Push, Stack, Throw], ids=lambda t: t.__name__)
+def test_the_table_of_arguments_names_every_argument(task):
+    text = (ROOT / "docs" / "environments" / f"{task.__name__.lower()}.md").read_text()
+    table = text[text.index("## Arguments") : text.index("## Action")]
+    named = {name for row in re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE)
+             for name in re.findall(r"`(\w+)`", row)}  # fmt: skip
+    known = {*argument_names(task), *argument_names(RigidEnv), *argument_names(RigidVectorEnv)}
+    assert named == known - {"task", "num_envs"}
