@@ -59,7 +59,7 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
         "policy",
         nargs="?",
         metavar="POLICY",
-        help='run folder, .safetensors file, model.zip or "scripted" '
+        help='run folder, .safetensors file, model.zip, "trained" (comes with it) or "scripted" '
         "(default: latest run of --algo on --env)",
     )
     add_latest(parser)
@@ -211,7 +211,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--policy",
         metavar="POLICY",
-        help='run folder, .safetensors file or "scripted" (default: random actions)',
+        help='run folder, .safetensors file, "trained" or "scripted" (default: random actions)',
     )
     parser.add_argument(
         "--num-worlds", type=count, default=16, help="number of worlds (default: %(default)s)"

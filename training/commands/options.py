@@ -100,10 +100,12 @@ def env_kwargs_of(options: argparse.Namespace) -> dict[str, Any]:
 def policy_of(options: argparse.Namespace) -> "Policy":
     """The policy that the first argument names, or that of the latest run."""
     from training.policies.policy import SCRIPTED, scripted_policy
-    from training.policies.trained_policy import trained_policy
+    from training.policies.trained_policy import SHIPPED, shipped_policy, trained_policy
 
     if options.policy == SCRIPTED:
         return scripted_policy(options.env or DEFAULT_ENV, **env_kwargs_of(options))
+    if options.policy == SHIPPED:
+        return shipped_policy(options.env or DEFAULT_ENV)
     return trained_policy(
         Path(options.policy) if options.policy else run_folder_of(options).path,
         algo=options.algo,

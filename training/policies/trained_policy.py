@@ -11,6 +11,8 @@ from training.policies.policy import Policy
 from training.policies.policy_file import SUFFIX, read_policy
 from training.runs.run_folder import RunFolder
 from training.settings.config import ALGORITHMS
+from training.settings.data_folders import data_folder
+from training.settings.environment_ids import plain_id
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, nearest
 
@@ -20,6 +22,31 @@ WITHOUT_REPLAY_BUFFER: dict[str, Any] = {
     "buffer_size": 1,
 }
 """Acting needs no replay buffer, and HerReplayBuffer cannot be built without environments."""
+
+
+SHIPPED = "trained"
+"""In place of a path: the policy of an environment that comes with the package."""
+
+
+def shipped_policy(env_id: str) -> Policy:
+    """The policy of an environment that comes with the package; it is trained with PPO.
+
+    Raises:
+        UsageError: There is none.
+    """
+    folders = data_folder("shipped", "results") / "ppo"
+    plain = plain_id(env_id)
+    path = folders / f"{plain.replace('/', '-')}_seed0" / f"policy{SUFFIX}"
+    if not path.is_file():
+        known = sorted(
+            p.parent.name.removesuffix("_seed0") for p in folders.glob(f"*_seed0/*{SUFFIX}")
+        )
+        raise UsageError(
+            f"no trained policy of {env_id!r} comes with the package; there are "
+            f"{', '.join(name.replace('-', '/', 1) for name in known)}"
+        )
+    name = f"{SHIPPED}-{plain.rpartition('/')[2]}"
+    return replace(read_policy(path, env_id=env_id), name=name, folder=None)
 
 
 def trained_policy(

@@ -13,15 +13,12 @@ from typing import Any
 import yaml
 
 from training.settings.config import ALGORITHMS, TrainConfig
+from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
 from training.settings.errors import UsageError, check_exists, nearest
 
-CONFIG_FOLDER = Path(__file__).resolve().parents[2] / "configs"
-"""The packaged settings, next to this package in the source tree and in the wheel.
-
-importlib.resources cannot read a folder without code from an editable install, and would prefer a
-`configs` folder of the user.
-"""
+CONFIG_FOLDER = data_folder("configs", "configs")
+"""The packaged settings."""
 SECTIONS = ("target_success_rate", "finetune_timesteps", "finetune_env_kwargs")
 """This project's own settings that may be top-level sections of a file."""
 

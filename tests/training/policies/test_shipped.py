@@ -1,0 +1,26 @@
+"""Policies that come with the package."""
+
+import pytest
+
+from training.commands import cli
+from training.policies.trained_policy import shipped_policy
+from training.settings.errors import UsageError
+
+
+@pytest.mark.parametrize("task", ["Push", "Stack", "Throw"])
+def test_each_task_has_one(task):
+    for env_id in (f"RigidEnvs/{task}-v0", f"RigidEnvs/{task}Dense-v0"):
+        policy = shipped_policy(env_id)
+        assert policy.env_id == env_id
+        assert policy.folder is None
+
+
+def test_another_environment_has_none_and_the_message_says_which_do():
+    with pytest.raises(UsageError, match=r"comes with the package; there are RigidEnvs/Push-v0, "):
+        shipped_policy("RigidEnvs/Pull-v0")
+
+
+def test_it_is_evaluated_by_name(capsys):
+    words = ["evaluate", "trained", "--env", "RigidEnvs/Push-v0", "-n", "50"]
+    assert cli.main(words) == 0
+    assert "trained-Push-v0" in capsys.readouterr().out
