@@ -6,6 +6,7 @@ runs/<algo>/<environment>_<number>/
     versions.json    versions of Python, platform and packages
     progress.csv     the learning curve; events.out.tfevents.* is the same for TensorBoard
     checkpoint_<n>/  the policy, and the state that training resumes from, see checkpoint.py
+    .lock            empty; locked while a process trains this run
 """
 
 import io
@@ -22,16 +23,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError, check_exists
 
-try:
-    import fcntl
-except ImportError:  # Windows has no fcntl: run folders are not locked there
-    fcntl = None  # type: ignore[assignment]
-
-CHECKPOINT = "checkpoint"
+CHECKPOINT, LOCK = "checkpoint", ".lock"
 PACKAGES = ("rigid-envs", "numpy", "numba", "gymnasium", "stable-baselines3", "torch")
 
 
@@ -103,12 +101,12 @@ class RunFolder:
         Raises:
             UsageError: Another process is training this run.
         """
-        with (self.path / "config.yaml").open("rb") as file:
-            if fcntl is not None:
-                try:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    raise UsageError(f"another process is training {self.path}") from None
+        self.check_exists()
+        try:
+            lock = FileLock(self.path / LOCK, timeout=0.0).acquire()
+        except Timeout:
+            raise UsageError(f"another process is training {self.path}") from None
+        with lock:
             yield
 
     def record_resumption(self, steps: int) -> None:
