@@ -9,7 +9,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.primitives import balls, primitives
 from rigid_envs.rendering.rays.intersections import BOX, CAPSULE
 from rigid_envs.rendering.rays.tables import DECAL, POLYGON, PRIMITIVE
-from rigid_envs.rendering.view import Arrow, Color, Ghost, Goal, Mark, Marker
+from rigid_envs.rendering.view import Arrow, Ghost, Goal, Mark, Marker
 
 Array = np.ndarray
 
@@ -51,10 +51,13 @@ def overlay(
             decals.append(_disc(marker))
         elif isinstance(marker, Mark):
             decals.append(_cross(marker))
-        elif isinstance(marker, Ghost):
-            glass.append(_place(marker))
-            lines = box_corners(marker.position, marker.half_extents)[EDGES]
-            polygons.append(_strips(lines, marker.color, camera, width, height))
+    ghosts = [marker for marker in markers if isinstance(marker, Ghost)]
+    if ghosts:
+        glass.append(_places(ghosts))
+        corners = [box_corners(ghost.position, ghost.half_extents) for ghost in ghosts]
+        lines = np.array(corners)[:, EDGES].reshape(-1, 2, 3)
+        colors = np.repeat([ghost.color for ghost in ghosts], len(EDGES), axis=0)
+        polygons.append(_strips(lines, colors, camera, width, height))
     for arrow in forces:
         polygons.append(_arrow(arrow, camera, width, height))
     return Overlay(np.concatenate(glass), np.concatenate(decals), np.concatenate(polygons))
@@ -116,25 +119,27 @@ def _cross(mark: Mark) -> Array:
     return table
 
 
-def _place(ghost: Ghost) -> Array:
-    table = primitives(1, BOX)
-    table["position"], table["size"] = ghost.position, ghost.half_extents
-    table["reach"] = np.linalg.norm(ghost.half_extents)
-    table["color"], table["opacity"] = ghost.color, GHOST_OPACITY
+def _places(ghosts: list[Ghost]) -> Array:
+    table = primitives(len(ghosts), BOX)
+    table["position"] = [ghost.position for ghost in ghosts]
+    table["size"] = [ghost.half_extents for ghost in ghosts]
+    table["reach"] = np.linalg.norm(table["size"], axis=1)
+    table["color"], table["opacity"] = [ghost.color for ghost in ghosts], GHOST_OPACITY
     return table
 
 
-def _strips(lines: Array, color: Color, camera: Camera, width: int, height: int) -> Array:
+def _strips(lines: Array, colors: Array, camera: Camera, width: int, height: int) -> Array:
     """Lines [n, 2, 3] m as thin polygons; those that reach behind the camera are left out."""
     pixels, depth = camera.project(lines, width, height)
-    pixels = pixels[depth.min(axis=1) > camera.near]
+    seen = depth.min(axis=1) > camera.near
+    pixels, colors = pixels[seen], colors[seen]
     along = pixels[:, 1] - pixels[:, 0]
     length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     aside = 0.5 * EDGE * along[:, ::-1] * (-1.0, 1.0) / length
     table = np.zeros(len(pixels), POLYGON)
     start, end = pixels[:, 0], pixels[:, 1]
     table["corners"] = np.stack([start - aside, end - aside, end + aside, start + aside], axis=1)
-    table["color"], table["opacity"] = color, 1.0
+    table["color"], table["opacity"] = colors, 1.0
     return table
 
 
