@@ -1,6 +1,6 @@
 """PPO in one file of plain PyTorch, on a vector environment that simulates all worlds at once.
 
-    python examples/ppo.py                                    # Push, about a minute on two cores
+    python examples/ppo.py                                    # Push, a minute on two idle cores
     python examples/ppo.py --env RigidEnvs/ThrowDense-v0 --gamma 0.97
 
 It is proximal policy optimisation (Schulman et al. 2017) with generalised advantage estimates
@@ -92,7 +92,8 @@ def train(options: argparse.Namespace) -> float:
     taken, log_probs = torch.zeros(steps, worlds, actions), torch.zeros(steps, worlds)
     rewards, values = np.zeros((steps, worlds)), np.zeros((steps + 1, worlds))
     ends = np.zeros((steps, worlds), dtype=bool)
-    start, threads, success = time.perf_counter(), torch.get_num_threads(), 0.0
+    start, success = time.perf_counter(), 0.0
+    threads = options.threads or torch.get_num_threads()
 
     for update in range(1, options.total_steps // (steps * worlds) + 1):
         # collect: torch's threads would spin on the cores that the worlds need
@@ -171,6 +172,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.95)
     parser.add_argument("--clip", type=float, default=0.2)
+    parser.add_argument("--threads", type=int, help="of updates (default: torch's)")
     parser.add_argument("--stop-at", type=float, default=0.97, help="success rate")
     return parser.parse_args(arguments)
 

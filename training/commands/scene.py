@@ -113,7 +113,7 @@ def run(
     )  # fmt: skip
     _summarise(made, count)
     if film is not None:
-        print(f"video       {film.path}, {film.count} frames, {film.rate:.1f} drawn a second")
+        print(f"video       {film.path}, {film.count} frames drawn, {film.rate:.1f} a second")
     return made
 
 
@@ -121,12 +121,12 @@ def _film(world: World, video: Path | None, size: int, fps: float) -> "Film | No
     """The video, whose writers are imported only if one is asked for."""
     if video is None:
         return None
+    from rigid_envs.rendering.pictures import LEAST, MOST
     from training.results.film import Film
 
-    try:
-        return Film(world, video, fps, size)
-    except ValueError as error:
-        raise UsageError(f"--size: {error}") from None
+    if not LEAST <= size <= MOST:
+        raise UsageError(f"--size is {size}, should be {LEAST} to {MOST} pixels")
+    return Film(world, video, fps, size)
 
 
 def _show(world: World, steps: int, wall: float, seconds: float) -> None:

@@ -85,7 +85,7 @@ def test_a_video_has_a_frame_for_each_25th_of_a_second(name, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("video", "message"),
     [
-        ("film.avi", r"'film\.avi', should end in \.mp4 or \.gif"),
+        ("film.avi", r"error: video is 'film\.avi', should end in \.mp4 or \.gif"),
         ("/proc/none/film.mp4", r"cannot write '/proc/none/film\.mp4'"),
     ],
 )
@@ -99,5 +99,5 @@ def test_a_video_that_cannot_be_written_is_named_before_anything_runs(video, mes
 def test_a_video_that_is_too_large_is_refused(capsys, tmp_path):
     words = ["scene", "heap", "--bodies", "40", "--video", str(tmp_path / "x.mp4")]
     assert main([*words, "--size", "5000"]) == 2
-    assert "--size: width must be at most 4096, got 5000" in capsys.readouterr().err
+    assert "--size is 5000, should be 16 to 4096 pixels" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
