@@ -116,8 +116,8 @@ def ray_and_triangle(ox, oy, oz, ex, ey, ez, a, b, c):
 def ray_and_torus(ox, oy, oz, ex, ey, ez, ring, radius):
     """Points within `radius` of the circle of radius `ring` about z.
 
-    The ray goes on by steps that can't pass the surface. With the gap g to it, its slope s along
-    the ray, and the ray's distance w from the axis, the gap after h is at least
+    The search moves along the ray by steps that can't pass the surface. With the gap g to it, its
+    slope s along the ray, and the ray's distance w from the axis, the gap after h is at least
     g + s h - h^2 / (2 w), as nothing but the circle's own curvature, at most 1 / w, bends the
     surface towards the ray. Half of w is used, and steps are no longer, as w changes. Near the
     surface these are Newton's steps.

@@ -186,8 +186,8 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
             t = depth[row, column]
             if t == math.inf:
                 continue
-            aside = (column + 0.5 - camera.half_width) * camera.pixel
-            u, v = eye_u + t * (row_u + aside * across_u), eye_v + t * (row_v + aside * across_v)
+            x = (column + 0.5 - camera.half_width) * camera.pixel
+            u, v = eye_u + t * (row_u + x * across_u), eye_v + t * (row_v + x * across_v)
             a, b = math.floor((u - left) * per_cell), math.floor((v - low) * per_cell)
             if (a < 0) | (b < 0) | (a >= side) | (b >= side):
                 continue

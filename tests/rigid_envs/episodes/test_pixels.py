@@ -83,7 +83,7 @@ def test_kinds_of_pixels_are_channels_in_order():
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_stack_holds_the_last_steps_and_starts_anew_with_an_episode(mode):
+def test_a_stack_holds_the_last_steps_and_begins_with_each_episode(mode):
     settings = {**SMALL, "max_episode_steps": 4}
     stacked = make_vec(3, **settings, frame_stack=3, autoreset_mode=mode)
     single = make_vec(3, **settings, autoreset_mode=mode)
@@ -94,11 +94,11 @@ def test_a_stack_holds_the_last_steps_and_starts_anew_with_an_episode(mode):
         ended = stacked._ended.copy()
         now, _, terminated, truncated, info = stacked.step(actions)
         new = single.step(actions)[0]
-        anew = ended if mode == "NextStep" else terminated | truncated
+        begun = ended if mode == "NextStep" else terminated | truncated
         past.append(new["observation"])
-        if anew.all():
+        if begun.all():
             past = [new["observation"]] * 3
-        if mode == "SameStep" and anew.all():
+        if mode == "SameStep" and begun.all():
             last = info["final_obs"][0]["observation"]
             assert last.shape == (32, 32, 9)
             assert (last[..., 3:6] != last[..., 6:]).any()
