@@ -312,8 +312,8 @@ class World:
 
         Raises:
             TypeError, ValueError: no such parameter, or a bad range; a range in which the substep
-                is unstable or a body sinks. The message names the solid that limits the substep and
-                the largest safe one.
+                is unstable, a body sinks, or one is too light for what presses it. The message
+                names the solid and the largest safe substep or the least mass.
         """
         if not isinstance(self._queries, LaneQueries):
             raise ValueError(

@@ -6,7 +6,8 @@ springs of contacts, and work W of the servos,
     K + U + V  <=  (K + U + V at the start) + W,
 
 for friction, damping and inelastic impacts only take energy. What exceeds it by more than 1e-3 of
-the servos' work, in absolute values, or 1 mJ is a failure.
+the servos' work, in absolute values, or 1 mJ is a failure. 1 mJ lifts the cube of 0.1 kg by 1 mm; a
+heavier body is allowed as much as lifts it by 1 mm.
 
 While a spring contact lasts, the energy of the kick-drift-kick steps oscillates by up to
 (omega h)^2 / 4 of V, and returns when it ends (omega h is Fidelity.contact_resolution, at most). As
@@ -19,11 +20,13 @@ collision may leave an overlap that holds no energy. This tests no less than wha
 import numpy as np
 
 from physics import World
+from physics.scene.parameters import Parameters
 
 Array = np.ndarray
 
 FRACTION = 1e-3  # of the servos' work, step by step in absolute values
 LEAST = 1e-3  # J
+LIFT = 1e-3  # m, of the heaviest body
 
 
 def elastic(world: World) -> Array:
@@ -56,6 +59,14 @@ def work(world: World) -> Array:
     return np.asarray(world.drive_work().sum(axis=1))
 
 
+def _least(world: World) -> Array:
+    """[count] J that are always allowed."""
+    per_world = world.features.per_world_parameters
+    masses = (world.parameters if per_world else Parameters.of(world.scene, world.count)).mass
+    heaviest = masses.max(axis=1)
+    return np.maximum(LEAST, heaviest * np.linalg.norm(world.scene.gravity) * LIFT)
+
+
 class Balance:
     """The balance of `count` worlds.
 
@@ -67,7 +78,7 @@ class Balance:
     def __init__(self, world: World) -> None:
         """Begins in the present state of all worlds."""
         self.gain = np.zeros(world.count)
-        self.allowed = np.full(world.count, LEAST)
+        self._least, self.allowed = _least(world), _least(world)
         self._start, self._work = start_energy(world), np.zeros(world.count)
         self._total = np.zeros(world.count)
 
@@ -79,6 +90,7 @@ class Balance:
         self._work = done
         if began.any():
             self._start[began], self._total[began] = start_energy(world)[began], 0.0
+            self._least[began] = _least(world)[began]
         self.gain = now - self._start - done
         oscillates = 0.25 * world.fidelity.contact_resolution**2 * stored
-        self.allowed = np.maximum(FRACTION * self._total, LEAST) + oscillates
+        self.allowed = np.maximum(FRACTION * self._total, self._least) + oscillates

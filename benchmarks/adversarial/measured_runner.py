@@ -1,7 +1,9 @@
 """Episodes with measured work of servos and, if asked for, hostile parameters of bodies.
 
-Masses are 10^-3 to 10^3 times those of the scene, each exponent equally likely; friction,
-restitution and sizes are uniform. The ranges of sizes are the largest that all presets accept:
+Masses are 10^-3 to 10^3 times those of the scene, each exponent equally likely, but no lighter than
+is accepted: a body is refused that a drive or a heavier body could press through what it lies on.
+Friction, restitution and sizes are uniform. The ranges of sizes are the largest that all presets
+accept:
 
 - Push: a cube below 0.05 times its size is refused at `fast`, which would let it sink into the
   ground by its own width; above 2.5 the task refuses it, because the cube would touch the finger;
@@ -14,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from physics.analysis.load_limits import LoadLimits
 from rigid_envs import Runner
 from rigid_envs.episodes.draws import uniform
 
@@ -45,22 +48,25 @@ class MeasuredRunner(Runner):
         randomize = ranges if self._draws_masses else None
         super().__init__(task, count, "dense", preset, threads, randomize=randomize)
         self._masses = np.array([body.mass for body in self.world.scene.bodies])
-        if self._draws_masses:
-            span = 10.0**DECADES
-            masses = (self._masses / span, self._masses * span)
-            # checked once, not at every reset
-            self.world.check_parameters({**ranges, "mass": masses})
+        self._loads = LoadLimits(self.world.scene, self.world.fidelity)
 
     def reset(
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
     ) -> None:
         """Starts episodes, see `Runner.reset`, with their own masses."""
+        draws_masses = self._draws_masses and mask.any()
+        if draws_masses:  # with which any size is accepted
+            self.world.set_parameters(mass=self._masses, worlds=mask)
         super().reset(mask, seeds, options)
-        if self._draws_masses and mask.any():
+        if draws_masses:
             bodies = len(self._masses)
             draws = uniform(self._seeds[mask], self._episodes[mask], bodies, _MASS_STREAM)
             factors = 10.0 ** (DECADES * (2.0 * draws - 1.0))
-            self.world.set_parameters(mass=self._masses * factors, worlds=mask)
+            drawn = self.world.parameters.pick(mask)._replace(mass=self._masses * factors)
+            for _ in range(bodies):  # a body that is made heavier presses the others harder
+                least = self._loads.least_masses(drawn)
+                drawn = drawn._replace(mass=np.maximum(drawn.mass, least))
+            self.world.set_parameters(mass=drawn.mass, worlds=mask)
 
     def start_episode(self, seed: int, episode: int) -> None:
         """Starts an episode of a seed in all worlds."""

@@ -1,9 +1,11 @@
 """Checks before per-world parameters are used that the substep is short enough for them."""
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from physics.analysis.load_limits import LoadLimits
 from physics.analysis.step_limits import check_range, check_world
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
@@ -20,6 +22,11 @@ class ParameterLimits:
         self._scene, self._fidelity = scene, fidelity
         self._safe: tuple[Parameters, Parameters] | None = None  # [1, bodies] each
 
+    @cached_property
+    def loads(self) -> LoadLimits:
+        """The least masses of the bodies."""
+        return LoadLimits(self._scene, self._fidelity)
+
     def check_range(self, low: Parameters, high: Parameters) -> None:
         """Checks a range of parameters and stores it as the safe range.
 
@@ -30,6 +37,11 @@ class ParameterLimits:
         Raises:
             ValueError: the substep is too long for parameters in the range.
         """
+        bodies = len(self._scene.bodies)
+        least = np.eye(bodies, dtype=bool)  # each body at its least beside the heaviest others
+        mass = np.where(least, low.mass, high.mass)
+        size = np.repeat(low.size, bodies, axis=0)
+        self.loads.check(Parameters.of(self._scene, bodies)._replace(mass=mass, size=size))
         check_range(self._scene, self._fidelity, low, high)
         self._safe = low, high
 
@@ -43,6 +55,7 @@ class ParameterLimits:
         Raises:
             ValueError: the substep is too long for the parameters of a world.
         """
+        self.loads.check(new, worlds)
         low, high = (
             Parameters(*(end(values, axis=0, keepdims=True) for values in new))
             for end in (np.min, np.max)

@@ -54,7 +54,7 @@ def drawn(scene, count=COUNT, seed=0):
     rng = np.random.default_rng(seed)
     shape = (count, len(scene.bodies))
     values = {
-        "mass": rng.uniform(0.02, 1.0, shape),
+        "mass": rng.uniform(0.2, 1.0, shape),
         "friction": rng.uniform(0.0, 1.0, shape),
         "restitution": rng.uniform(0.0, 1.0, shape),
         "size": 2.0 ** rng.integers(-1, 2, (count, 1)) * np.ones(shape),

@@ -1,0 +1,125 @@
+"""A body that is too light for what presses it is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from physics import (
+    PRESETS,
+    Body,
+    Box,
+    Drive,
+    Gripper,
+    Ground,
+    Material,
+    Scene,
+    Sphere,
+    World,
+)
+from physics.analysis.load_limits import LoadLimits
+from physics.reference import scenes
+from physics.scene.parameters import Parameters
+
+FORCE, MASS, FREQUENCY, WIDTH = 20.0, 0.3, 60.0, 0.04  # of scenes.push_like
+
+
+def limits(scene, fidelity="balanced"):
+    return LoadLimits(scene, PRESETS[fidelity])
+
+
+def least(scene, fidelity="balanced", **values):
+    p = Parameters.of(scene)
+    shaped = {name: np.array([value], dtype=float) for name, value in values.items()}
+    return limits(scene, fidelity).least_masses(p._replace(**shaped))[0]
+
+
+def pressed(mass, fidelity="balanced"):
+    """m, the lowest centre of a cube of a mass on which a drive comes down with all its force."""
+    scene = scenes.push_like()
+    world = World(scene, fidelity, per_world_parameters=True, allow_unstable=True)
+    world.set_parameters(mass=mass)
+    world.set_state(drive_position=[[[0.0, 0.0, 0.08]]])
+    world.command_drives((0.0, 0.0, -1.0))
+    lowest = np.inf
+    for _ in range(200):
+        world.advance(2e-3)
+        lowest = min(lowest, float(world.position[0, 0, 2]))
+    return lowest
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "balanced"])
+def test_least_mass_is_that_of_the_spring_that_stops_a_drive(fidelity):
+    settings = PRESETS[fidelity]
+    omega = settings.contact_resolution / settings.substep
+    energy = 0.5 * MASS * (FORCE / (MASS * FREQUENCY)) ** 2
+    expected = 2.0 * (FORCE * WIDTH + energy) / (WIDTH * omega) ** 2
+    np.testing.assert_allclose(least(scenes.push_like(1.0), fidelity), expected, rtol=1e-12)
+
+
+def test_the_spring_of_the_least_mass_stops_a_load_after_one_width():
+    """m x'' = F - k x from rest at F / k, and from the speed of the energy that the load has."""
+    k = 1000.0
+    force, energy = 3.0, 0.1
+    depth = force / k + np.sqrt((force / k) ** 2 + 2.0 * energy / k)
+    np.testing.assert_allclose(2.0 * (force * depth + energy) / depth**2, k)
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "balanced"])
+def test_a_drive_presses_the_centre_of_a_cube_to_the_ground_at_about_the_least_mass(fidelity):
+    (lightest,) = least(scenes.push_like(1.0), fidelity)
+    assert pressed(3.0 * lightest, fidelity) > 0.05 * WIDTH
+    assert pressed(0.3 * lightest, fidelity) < 0.0
+
+
+def test_a_heavier_body_on_top_counts():
+    scene = scenes.two_cubes(ground=0.0, gravity=9.81)
+    omega = 0.5 / 2e-3
+    masses = least(scene, mass=[0.1, 200.0])
+    np.testing.assert_allclose(masses[0], 2.0 * 200.0 * 9.81 / (WIDTH * omega**2), rtol=1e-12)
+    assert masses[1] < 0.2
+    world = World(scene, count=2, per_world_parameters=True)
+    with pytest.raises(ValueError, match=r"mass 0\.1 kg of body 0 in world 1 is too small.*body 1"):
+        world.set_parameters(mass=[[0.1, 0.1], [0.1, 200.0]])
+    with pytest.raises(ValueError, match=r"mass 0\.1 kg of body 0 is too small.*body 1 could"):
+        world.check_parameters({"mass": ([0.1, 0.1], [0.1, 200.0])})
+    np.testing.assert_array_equal(world.parameters.mass, 0.1)
+
+
+def test_message_says_what_would_be_right():
+    world = World(scenes.push_like(), per_world_parameters=True)
+    with pytest.raises(ValueError, match=r"mass 0\.001 kg of body 0 in world 0 ") as error:
+        world.set_parameters(mass=1e-3)
+    message = str(error.value)
+    assert (
+        "is too small for Fidelity.substep 0.002 s: drive 0 could press it through what it lies "
+        "on, by its width of 0.04 m; use at least 0.0" in message
+    )
+    world.set_parameters(mass=float(message.split("at least ")[1].split(" kg")[0]))
+
+
+def test_masses_of_the_scene_are_accepted_and_sizes_at_these_masses():
+    scene = scenes.push_like(1e-3)
+    world = World(scene, count=2, per_world_parameters=True)
+    world.set_parameters(mass=[[1e-3], [2e-3]], size=[[1.0], [0.6]])
+    with pytest.raises(ValueError, match=r"0\.0009 kg.*at least 0\.001 kg"):
+        world.set_parameters(mass=9e-4)
+
+
+def test_what_can_not_press_does_not_count():
+    cube = Body(Box((0.02,) * 3), mass=0.1, position=(0.0, 0.0, 0.02))
+    drive = Drive(Sphere(0.015), MASS, FORCE, (0.0, 0.0, 0.1))
+    for scene in (
+        Scene([cube], [], [drive]),  # nothing to be pressed into
+        Scene([cube], [Ground()], [replace(drive, group=2, mask=2)]),
+        Scene([replace(cube, material=Material(stiffness=1e4))], [Ground()], [drive]),
+    ):
+        assert least(scene) == 0.0
+
+
+def test_the_fingers_of_a_gripper_press_together():
+    cube = Body(Box((0.02,) * 3), mass=1.0, position=(0.0, 0.0, 0.02))
+    gripper = Gripper(Sphere(0.015), 0.5 * MASS, FORCE, 4.0, (0.0, 0.0, 0.1))
+    np.testing.assert_allclose(
+        least(Scene([cube], [Ground()], [gripper])), least(scenes.push_like(1.0)), rtol=1e-12
+    )
