@@ -30,8 +30,9 @@ class RigidEnv(gym.Env[Observation, Array]):
         render_mode: None, "rgb_array" or "human".
         width: of a frame in pixels.
         height: of a frame in pixels.
-        camera: where frames are taken from: "task", "front", "side", "back" or "top", a dict with
-            position, target (m) or field_of_view (degrees), or a Camera; the task's own if None.
+        camera: where frames are taken from: "task", "follow", "front", "side", "back" or "top", a
+            dict with position, target (m) or field_of_view (degrees), or a Camera; the task's own
+            if None. "follow" follows the first body, for frames alone.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
         max_episode_steps: number of steps after which an episode is truncated; the task's number if

@@ -46,8 +46,9 @@ STRIPS = {
 SIZE = 360  # pixels of a strip's frame
 
 # the animation: how many steps are shown of each task's episodes
-FILM_STEPS, FILM_LENGTH = {"Push": 24, "Stack": 48, "Throw": 24}, 96
+FILM_STEPS, FILM_LENGTH = {"Push": 16, "Stack": 48, "Throw": 24}, 96
 FILM_SIZE, FILM_FPS = 300, 25.0
+CAMERAS = {"Throw": "follow"}  # of tasks whose body is small beside its way
 
 
 def draw_strip(name: str, path: Path) -> None:
@@ -83,7 +84,10 @@ def draw_film(path: Path) -> None:
 def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:
     """Frames of an episode: one at the start, and one after each step."""
     env_id, own, act = _player(task, arguments)
-    shown = {"render_mode": "rgb_array", "width": size, "height": size, "max_episode_steps": -1}
+    shown = {
+        "render_mode": "rgb_array", "width": size, "height": size, "max_episode_steps": -1,
+        "camera": CAMERAS.get(task),
+    }  # fmt: skip
     with closing(make_single_env(env_id, **{**own, **shown})) as env:
         observation, _ = env.reset(seed=seed)
         yield np.asarray(env.render())

@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 from physics.scene.validation import choice, integer
 from rigid_envs.rendering import scene_view
-from rigid_envs.rendering.cameras import choose_camera
+from rigid_envs.rendering.cameras import FOLLOW, choose_camera
 from rigid_envs.rendering.renderer import Frames, Renderer
 
 if TYPE_CHECKING:
@@ -57,10 +57,10 @@ def pixel_settings(
         pixels: one of `CHANNELS`, or several.
         pixel_size: width and height in pixels, or (width, height).
         frame_stack: how many steps a picture shows.
-        camera: see `choose_camera`.
+        camera: see `choose_camera`; it must not move.
 
     Raises:
-        TypeError, ValueError: an unknown name, or a number out of its range.
+        TypeError, ValueError: an unknown name, a number out of its range, or a camera that moves.
     """
     choice("obs_type", obs_type, OBSERVATION_TYPES)
     kinds = _check_kinds(pixels)
@@ -77,6 +77,11 @@ def pixel_settings(
                     f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "state"'
                 )
         return None
+    if isinstance(camera, str) and camera == FOLLOW:
+        raise ValueError(
+            f'camera="{FOLLOW}" moves, and is for frames alone; obs_type={obs_type!r} needs one '
+            'that stands still, such as "task"'
+        )
     return PixelSettings(obs_type == "pixels+state", kinds, width, height, stack, camera)
 
 

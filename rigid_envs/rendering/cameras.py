@@ -7,18 +7,23 @@ import numpy as np
 
 from rigid_envs.rendering.camera import Camera
 
+Array = np.ndarray
+
 # azimuth and elevation in degrees of the eye, about what the task's own camera looks at
 NAMED = {"front": (-90.0, 20.0), "side": (0.0, 20.0), "back": (90.0, 20.0), "top": (-90.0, 90.0)}
 FIELDS = ("position", "target", "field_of_view")
+# follows the first body from nearer: the share of the own camera's distance, that of the way from
+# the body to the goal at which it looks, and that of the picture in which both are
+FOLLOW, NEAR, AHEAD, USED = "follow", 0.6, 1.0 / 3.0, 0.85
 
 
 def choose_camera(given: Any, own: Camera) -> Camera:
     """A camera from a name, from settings, or the task's own.
 
     Args:
-        given: None or "task": `own`; one of `NAMED`: the same target, distance and field of view
-            from another side; a Camera; or a dict with some of `FIELDS`, the others being those of
-            `own`.
+        given: None, "task" or "follow": `own`, which `following` moves; one of `NAMED`: the same
+            target, distance and field of view from another side; a Camera; or a dict with some of
+            `FIELDS`, the others being those of `own`.
         own: the task's camera.
 
     Raises:
@@ -28,12 +33,11 @@ def choose_camera(given: Any, own: Camera) -> Camera:
     if given is None or isinstance(given, Camera):
         return given or own
     if isinstance(given, str):
-        if given == "task":
+        if given in ("task", FOLLOW):
             return own
         if given not in NAMED:
-            raise ValueError(
-                f"camera must be one of {', '.join(map(repr, ('task', *NAMED)))}, got {given!r}"
-            )
+            names = ", ".join(map(repr, ("task", FOLLOW, *NAMED)))
+            raise ValueError(f"camera must be one of {names}, got {given!r}")
         azimuth, elevation = NAMED[given]
         return Camera.around(own.target, own.distance, azimuth, elevation, own.field_of_view)
     if not isinstance(given, Mapping):
@@ -44,6 +48,22 @@ def choose_camera(given: Any, own: Camera) -> Camera:
     if unknown := [name for name in given if name not in FIELDS]:
         raise ValueError(f"camera has no field {unknown[0]!r}: its fields are {', '.join(FIELDS)}")
     return Camera(**{name: getattr(own, name) for name in FIELDS} | dict(given))
+
+
+def following(own: Camera, body: Array, goal: Array) -> Camera:
+    """The task's camera, nearer, and moved along with a body; it sees the body and the goal.
+
+    Args:
+        own: the task's camera.
+        body: (3,) m, its centre.
+        goal: (3,) m.
+    """
+    target = body + AHEAD * (goal - body)
+    target[2] = max(target[2], 0.0)  # whatever falls, the eye stays above the ground
+    around = tuple(target.tolist())
+    fitting = _fitting(around, own, np.array([body, goal]), USED)
+    distance = max(NEAR * own.distance, fitting)
+    return Camera.around(around, distance, own.azimuth, own.elevation, own.field_of_view)
 
 
 def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0) -> Camera:
@@ -60,9 +80,12 @@ def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 3
         [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     )
     target = tuple((0.5 * (low + high)).tolist())
-    # how far each corner is from the target across the picture and into it
-    unit = Camera.around(target, 1.0, azimuth, elevation)
-    local = (corners - target) @ unit.axes.T
-    slope = np.tan(0.5 * np.radians(unit.field_of_view))
-    needed = np.abs(local[:, :2]).max(axis=1) / slope - local[:, 2]
-    return Camera.around(target, float(needed.max()), azimuth, elevation)
+    own = Camera.around(target, 1.0, azimuth, elevation)
+    return Camera.around(target, _fitting(target, own, corners), azimuth, elevation)
+
+
+def _fitting(target: tuple[float, ...], own: Camera, points: Array, used: float = 1.0) -> float:
+    """m, least distance from a target at which points are within a share of a square picture."""
+    local = (points - target) @ own.axes.T  # across the picture, and into it
+    slope = used * np.tan(0.5 * np.radians(own.field_of_view))
+    return float((np.abs(local[:, :2]).max(axis=1) / slope - local[:, 2]).max())

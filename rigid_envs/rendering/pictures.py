@@ -1,6 +1,7 @@
 """Pictures of a runner's worlds: what both kinds of environment share."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -8,7 +9,8 @@ import numpy as np
 
 from physics.scene.validation import choice, instance, integer
 from rigid_envs.rendering import scene_view
-from rigid_envs.rendering.cameras import choose_camera
+from rigid_envs.rendering.camera import Camera
+from rigid_envs.rendering.cameras import FOLLOW, choose_camera, following
 from rigid_envs.rendering.renderer import Renderer, grid
 from rigid_envs.rendering.window import Window
 
@@ -37,7 +39,7 @@ class Pictures:
         worlds: how many to draw at most.
 
     Attributes:
-        camera: where to look from.
+        camera: where to look from; with "follow" the task's camera, which each frame moves.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Pictures:
         self._width = integer("width", width, low=LEAST, high=MOST)
         self._height = integer("height", height, low=LEAST, high=MOST)
         self.camera = choose_camera(camera, runner.task.camera)
+        self._follows = isinstance(camera, str) and camera == FOLLOW
         self._floor = scene_view.floor(runner.world.scene).height
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)
         self._renderer: Renderer | None = None
@@ -95,17 +98,32 @@ class Pictures:
         self._window = self._renderer = None
 
     def _draw(self, width: int, height: int) -> tuple[Array, ...]:
-        if self._renderer is None:
-            threads = self._runner.world.threads
-            self._renderer = Renderer(
-                width, height, self.camera, floor=self._floor, threads=threads
+        if self._follows:
+            return tuple(
+                self._frames(self._looking(self._following(world), width, height), [world])[0]
+                for world in range(self._count)
             )
-        worlds = np.arange(self._count)
-        items = scene_view.items(self._runner, worlds, particles=self._show_particles)
-        overlays = [self._renderer.overlay(*self._beside(world)) for world in range(self._count)]
-        rgb = self._renderer.frames(items, overlays, worlds=self._count).rgb
+        if self._renderer is None:
+            self._renderer = self._looking(self.camera, width, height)
+        return tuple(self._frames(self._renderer, range(self._count)))
+
+    def _looking(self, camera: Camera, width: int, height: int) -> Renderer:
+        threads = self._runner.world.threads
+        return Renderer(width, height, camera, floor=self._floor, threads=threads)
+
+    def _following(self, world: int) -> Camera:
+        """The camera that follows the first body, towards the goal if that is a place."""
+        body, goal = self._runner.world.position[world, 0], self._runner.goals[world, :3]
+        units = [unit for _, unit, _, _ in self._runner.task.goal_bounds[:3]]
+        return following(self.camera, body, goal if units == ["m"] * 3 else body)
+
+    def _frames(self, renderer: Renderer, worlds: Sequence[int]) -> Array:
+        """[n, height, width, 3] uint8 of some worlds."""
+        items = scene_view.items(self._runner, np.array(worlds), particles=self._show_particles)
+        overlays = [renderer.overlay(*self._beside(world)) for world in worlds]
+        rgb = renderer.frames(items, overlays, worlds=len(worlds)).rgb
         assert rgb is not None
-        return tuple(rgb)
+        return rgb
 
     def _beside(self, world: int) -> tuple[Any, Any]:
         """Markers and forces of a world."""

@@ -16,6 +16,7 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
 from physics import World
 from rigid_envs.rendering import scene_view
+from rigid_envs.rendering.cameras import following
 from rigid_envs.rendering.renderer import grid
 from rigid_envs.rendering.view import BODY_COLORS, Mark
 from rigid_envs.tasks import Push, Stack, Throw, push
@@ -288,3 +289,37 @@ def test_pictures_need_no_pygame():
         "assert 'pygame' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_a_following_camera_keeps_ball_and_target_in_the_picture_on_the_whole_way():
+    task, draws = Throw(), np.random.default_rng(1).random((50, 2))
+    env = make_vec(50, "RigidEnvs/Throw-v0", fidelity="fast")
+    env.reset(seed=0)
+    goals = task.start(env._runner.world, np.ones(50, dtype=bool), draws)
+    for ball in env._runner.world.position[:, 0]:
+        for goal in goals:
+            for share in (0.0, 0.5, 1.0):  # of the way from the hand to the target
+                place = ball + share * (goal - ball) + (0.0, 0.0, share * (1.0 - share))
+                camera = following(task.camera, place, goal)
+                pixels, depth = camera.project(np.array([place, goal]), 480, 480)
+                assert pixels.min() > 5
+                assert pixels.max() < 475
+                assert 480 * 0.04 * camera.focal_length(1) / depth[0] > 18  # pixels of the ball
+
+
+def test_a_following_camera_moves_with_the_first_body_of_each_world():
+    options = {"render_mode": "rgb_array", "width": 96, "height": 96}
+    moving, still = (
+        make_vec(2, "RigidEnvs/Throw-v0", camera=name, fidelity="fast", **options)
+        for name in ("follow", "task")
+    )
+    for envs in (moving, still):
+        envs.reset(seed=3)
+    before = moving.render()
+    places = moving._runner.world.position[:, 0] + [[0.3, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    moving._runner.world.set_state(position=places[:, None])
+    after = moving.render()
+    assert (before[0] != after[0]).any()
+    np.testing.assert_array_equal(before[1], after[1])
+    assert (before[0] != still.render()[0]).any()
+    assert moving.camera == still.camera
