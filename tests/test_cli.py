@@ -62,7 +62,7 @@ def test_every_command_has_help(command, capsys):
         (["train", "--hyperparams", "gamma"], "should be KEY:VALUE"),
         (["train", "--hyperparams", "gamma:2"], "gamma is 2, should be a number above 0"),
         (["train", "--frobnicate"], "unrecognized arguments: --frobnicate"),
-        (["evaluate", "-f", "nowhere"], "no run of ppo on RigidEnvs/Push-v0 in nowhere"),
+        (["evaluate", "-f", "nowhere"], "no run in nowhere; to train one: rigid-envs train"),
         (["record", "-f", "nowhere", "--algo", "sac"], "no run of sac"),
         (["tune", "--algo", "pp0"], "did you mean 'ppo'?"),
         (["tune", "--n-trials", "0"], "should be an integer of at least 1"),

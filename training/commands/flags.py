@@ -60,7 +60,7 @@ def add_policy(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         metavar="POLICY",
         help='run folder, .safetensors file, model.zip, "trained" (comes with it) or "scripted" '
-        "(default: latest run of --algo on --env)",
+        "(default: the run started last)",
     )
     add_latest(parser)
     add_device(parser)
@@ -132,10 +132,12 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
 def add_latest(parser: argparse.ArgumentParser) -> None:
     """Flags that select the latest run, or describe a model.zip outside a run folder."""
     parser.add_argument(
-        "--algo", help=f"algorithm: ppo or sac (default: that of the policy, or {DEFAULT_ALGO})"
+        "--algo",
+        help="algorithm: ppo or sac (default: that of the policy or of the run started last)",
     )
     parser.add_argument(
-        "--env", help=f"environment id (default: that of the policy, or {DEFAULT_ENV})"
+        "--env",
+        help=f"environment id (default: likewise; of trained and scripted: {DEFAULT_ENV})",
     )
     add_folder(parser)
 

@@ -122,4 +122,4 @@ def run_folder_of(options: argparse.Namespace) -> "RunFolder":
 
     if options.policy is not None:
         return RunFolder(Path(options.policy))
-    return latest_run(options.log_folder, options.algo or DEFAULT_ALGO, options.env or DEFAULT_ENV)
+    return latest_run(options.log_folder, options.algo, options.env)

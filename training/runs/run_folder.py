@@ -153,19 +153,23 @@ def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
     return RunFolder(path)
 
 
-def latest_run(log_folder: Path, algo: str, env_id: str) -> RunFolder:
-    """The run with the highest number.
+def latest_run(log_folder: Path, algo: str | None = None, env_id: str | None = None) -> RunFolder:
+    """The run that was started or resumed last, of any algorithm or environment where None.
 
     Raises:
         UsageError: There is none.
     """
-    runs = _runs(log_folder, algo, env_id)
+    runs = [
+        (description.stat().st_mtime_ns, int(number), description.parent)
+        for description in log_folder.glob(f"{algo or '*'}/*/run.json")
+        for name, _, number in [description.parent.name.rpartition("_")]
+        if number.isdecimal() and (env_id is None or name == folder_name(env_id))
+    ]
     if not runs:
-        raise UsageError(
-            f"no run of {algo} on {env_id} in {log_folder}; "
-            f"to train one: rigid-envs train --algo {algo} --env {env_id}"
-        )
-    return RunFolder(max(runs)[1])
+        wanted = (f" of {algo}" if algo else "") + (f" on {env_id}" if env_id else "")
+        flags = (f" --algo {algo}" if algo else "") + (f" --env {env_id}" if env_id else "")
+        raise UsageError(f"no run{wanted} in {log_folder}; to train one: rigid-envs train{flags}")
+    return RunFolder(max(runs)[2])
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 """Run folders: never reused, with a record of how the run was started."""
 
 import json
+import os
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -77,15 +79,24 @@ def test_commit_is_marked_dirty_after_changes(tmp_path, monkeypatch):
     assert git_commit() == f"{commit}-dirty"
 
 
-def test_latest_run_is_the_one_with_the_highest_number(tmp_path, quick_ppo):
-    for _ in range(10):
-        newest = create_run_folder(tmp_path, quick_ppo)
-    assert latest_run(tmp_path, "ppo", "Test/Reach-v0") == newest
+def test_latest_run_is_the_one_that_was_started_or_resumed_last(tmp_path, quick_ppo):
+    other = replace(quick_ppo, env_id="Test/Other-v0")
+    runs = [create_run_folder(tmp_path, config) for config in (quick_ppo, quick_ppo, other)]
+    for age, run in enumerate(reversed(runs)):
+        os.utime(run.path / "run.json", ns=(0, 10**18 - age))
+    assert latest_run(tmp_path) == runs[2]
+    assert latest_run(tmp_path, "ppo") == runs[2]
+    assert latest_run(tmp_path, "ppo", "Test/Reach-v0") == runs[1]
+    assert latest_run(tmp_path, env_id="Test/Other-v0") == runs[2]
+    runs[0].record_resumption(80)
+    assert latest_run(tmp_path) == runs[0]
 
 
 def test_missing_run_suggests_the_command(tmp_path):
     with pytest.raises(UsageError, match="rigid-envs train --algo ppo --env Test/Reach-v0"):
         latest_run(tmp_path, "ppo", "Test/Reach-v0")
+    with pytest.raises(UsageError, match=r"no run in .*rigid-envs train$"):
+        latest_run(tmp_path)
 
 
 def test_log_folder_that_is_a_file_raises(tmp_path, quick_ppo):
