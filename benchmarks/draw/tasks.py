@@ -14,8 +14,8 @@ from PIL import Image
 from benchmarks.report.provenance import ROOT
 from training.policies.policy_file import read_policy
 from training.results.gif import GifWriter
+from training.results.video import film_env
 from training.scripted import controller_for
-from training.settings.environments import make_single_env
 
 Array = np.ndarray
 
@@ -48,7 +48,6 @@ SIZE = 360  # pixels of a strip's frame
 # the animation: how many steps are shown of each task's episodes
 FILM_STEPS, FILM_LENGTH = {"Push": 16, "Stack": 48, "Throw": 24}, 96
 FILM_SIZE, FILM_FPS = 300, 25.0
-CAMERAS = {"Throw": "follow"}  # of tasks whose body is small beside its way
 
 
 def draw_strip(name: str, path: Path) -> None:
@@ -84,11 +83,8 @@ def draw_film(path: Path) -> None:
 def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:
     """Frames of an episode: one at the start, and one after each step."""
     env_id, own, act = _player(task, arguments)
-    shown = {
-        "render_mode": "rgb_array", "width": size, "height": size, "max_episode_steps": -1,
-        "camera": CAMERAS.get(task),
-    }  # fmt: skip
-    with closing(make_single_env(env_id, **{**own, **shown})) as env:
+    shown = {"width": size, "height": size, "max_episode_steps": -1}
+    with closing(film_env(env_id, {**own, **shown})) as env:
         observation, _ = env.reset(seed=seed)
         yield np.asarray(env.render())
         for _ in range(steps):

@@ -12,8 +12,8 @@ Array = np.ndarray
 # azimuth and elevation in degrees of the eye, about what the task's own camera looks at
 NAMED = {"front": (-90.0, 20.0), "side": (0.0, 20.0), "back": (90.0, 20.0), "top": (-90.0, 90.0)}
 FIELDS = ("position", "target", "field_of_view")
-# follows the first body from nearer: the share of the own camera's distance, that of the way from
-# the body to the goal at which it looks, and that of the picture in which both are
+# follows a place from nearer: the share of the own camera's distance, that of the way from there
+# to the goal at which it looks, and that of the picture in which both are
 FOLLOW, NEAR, AHEAD, USED = "follow", 0.6, 1.0 / 3.0, 0.85
 
 
@@ -50,18 +50,18 @@ def choose_camera(given: Any, own: Camera) -> Camera:
     return Camera(**{name: getattr(own, name) for name in FIELDS} | dict(given))
 
 
-def following(own: Camera, body: Array, goal: Array) -> Camera:
-    """The task's camera, nearer, and moved along with a body; it sees the body and the goal.
+def following(own: Camera, place: Array, goal: Array) -> Camera:
+    """The task's camera, nearer, and moved along with a place; it sees the place and the goal.
 
     Args:
         own: the task's camera.
-        body: (3,) m, its centre.
+        place: (3,) m, what is to reach the goal.
         goal: (3,) m.
     """
-    target = body + AHEAD * (goal - body)
+    target = place + AHEAD * (goal - place)
     target[2] = max(target[2], 0.0)  # whatever falls, the eye stays above the ground
     around = tuple(target.tolist())
-    fitting = _fitting(around, own, np.array([body, goal]), USED)
+    fitting = _fitting(around, own, np.array([place, goal]), USED)
     distance = max(NEAR * own.distance, fitting)
     return Camera.around(around, distance, own.azimuth, own.elevation, own.field_of_view)
 

@@ -112,10 +112,13 @@ class Pictures:
         return Renderer(width, height, camera, floor=self._floor, threads=threads)
 
     def _following(self, world: int) -> Camera:
-        """The camera that follows the first body, towards the goal if that is a place."""
-        body, goal = self._runner.world.position[world, 0], self._runner.goals[world, :3]
-        units = [unit for _, unit, _, _ in self._runner.task.goal_bounds[:3]]
-        return following(self.camera, body, goal if units == ["m"] * 3 else body)
+        """The camera that follows what is to reach the goal; the first body if it is no place."""
+        engine, task = self._runner.world, self._runner.task
+        if [unit for _, unit, _, _ in task.goal_bounds[:3]] == ["m"] * 3:
+            place = task.achieved(engine, engine.read())[world, :3]
+            return following(self.camera, place, self._runner.goals[world, :3])
+        body = engine.position[world, 0]
+        return following(self.camera, body, body)
 
     def _frames(self, renderer: Renderer, worlds: Sequence[int]) -> Array:
         """[n, height, width, 3] uint8 of some worlds."""

@@ -91,9 +91,10 @@ def draw_learning_curves(
             axes.axhline(100 * target, color="gray", linestyle=":")
     left.set(xlabel="wall time / s", ylabel="success / %", ylim=(-2, 102))
     right.set(xlabel="environment steps / million")
-    if len(curves) > 1:
-        right.legend(loc="lower right", fontsize="small")
-    figure.suptitle(title)
+    if len(curves) > 1:  # above the plots, where it hides nothing
+        lines, names = right.get_legend_handles_labels()
+        figure.legend(lines, names, loc="outside upper right", ncols=len(names), fontsize="small")
+    figure.suptitle(title, x=0.01, ha="left")
     image.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(image, dpi=120)
 

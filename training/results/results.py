@@ -16,9 +16,8 @@ from training.settings.errors import UsageError, check_exists
 
 SOURCE = Path(__file__).resolve().parents[2]
 """The source tree with the recorded results; an installed package has none."""
-GIF_WIDTHS = (320, 240, 160)
-"""Pixels, tried in this order until a GIF is small enough."""
-GIF_EPISODES = 3
+GIF_SIZES = ((320, 3), (240, 3), (240, 2), (160, 2))
+"""Pixels and number of episodes, tried in this order until a GIF is small enough."""
 
 
 def update_results(
@@ -126,17 +125,17 @@ def _update_images(
 
 
 def _record_gif(policy_file: Path, video: Path, quiet: bool) -> None:
-    """Records a GIF of a policy at the largest width for which the file is small enough."""
+    """Records a GIF of a policy at the largest size for which the file is small enough."""
     policy = read_policy(policy_file)
-    for width in GIF_WIDTHS:
+    for width, episodes in GIF_SIZES:
         with tempfile.TemporaryDirectory() as folder:  # `record` writes a still image too
             made, _ = record(
                 policy,
                 Path(folder) / video.name,
-                episodes=GIF_EPISODES,
+                episodes=episodes,
                 gif_width=width,
                 quiet=quiet,
             )
-            if made.stat().st_size <= MAX_FILE_BYTES or width == GIF_WIDTHS[-1]:
+            if made.stat().st_size <= MAX_FILE_BYTES or (width, episodes) == GIF_SIZES[-1]:
                 video.write_bytes(made.read_bytes())
                 return

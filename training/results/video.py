@@ -5,6 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import imageio.v2 as imageio
 import numpy as np
 from rich.console import Console
@@ -39,7 +40,8 @@ def record(
         seed: Seed of the first episode.
         quiet: Show no progress.
         gif_width: Width of a GIF in pixels; an mp4 has the size of the frames.
-        env_kwargs: Arguments of the environment that replace those of training.
+        env_kwargs: Arguments of the environment that replace those of training; without "camera",
+            the task's own choice for videos films.
 
     Returns:
         The paths of the video and of the still image, which shows the middle of the first episode.
@@ -49,8 +51,7 @@ def record(
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
-    arguments = {**policy.env_kwargs, **env_kwargs, "render_mode": "rgb_array"}
-    env = make_single_env(policy.env_id, **arguments)
+    env = film_env(policy.env_id, {**policy.env_kwargs, **env_kwargs})
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())
@@ -62,6 +63,20 @@ def record(
             for frame in frames:
                 writer.append_data(frame)
     return video, still
+
+
+def film_env(env_id: str, arguments: dict[str, Any]) -> gym.Env:
+    """The single environment with frames from `arguments["camera"]`, or the task's film camera.
+
+    Raises:
+        UsageError: As `make_single_env`.
+    """
+    env = make_single_env(env_id, **arguments, render_mode="rgb_array")
+    task = getattr(env.unwrapped, "task", None)
+    if "camera" in arguments or task is None or task.film_camera == "task":
+        return env
+    env.close()
+    return make_single_env(env_id, **arguments, render_mode="rgb_array", camera=task.film_camera)
 
 
 def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:

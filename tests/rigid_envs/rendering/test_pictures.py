@@ -307,7 +307,7 @@ def test_a_following_camera_keeps_ball_and_target_in_the_picture_on_the_whole_wa
                 assert 480 * 0.04 * camera.focal_length(1) / depth[0] > 18  # pixels of the ball
 
 
-def test_a_following_camera_moves_with_the_first_body_of_each_world():
+def test_a_following_camera_moves_with_the_ball_of_each_world_until_it_lands():
     options = {"render_mode": "rgb_array", "width": 96, "height": 96}
     moving, still = (
         make_vec(2, "RigidEnvs/Throw-v0", camera=name, fidelity="fast", **options)
@@ -323,3 +323,10 @@ def test_a_following_camera_moves_with_the_first_body_of_each_world():
     np.testing.assert_array_equal(before[1], after[1])
     assert (before[0] != still.render()[0]).any()
     assert moving.camera == still.camera
+    moving._runner.world.set_state(position=(0.5, 0.0, 0.1), linear_velocity=(2.0, 0.0, 0.0))
+    moving._runner.world.advance(1.0)
+    landed = moving.render()
+    moving._runner.world.advance(0.2)
+    assert (moving._runner.world.position[:, 0, 0] > 1.0).all()
+    corner = np.s_[:40, :40]  # of the sky and the ground beyond
+    np.testing.assert_array_equal(moving.render()[0][corner], landed[0][corner])
