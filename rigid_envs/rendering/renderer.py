@@ -18,7 +18,6 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.ground import ground
 from rigid_envs.rendering.markers import Overlay, overlay, stacked
 from rigid_envs.rendering.primitives import balls, placed, shape_primitives
-from rigid_envs.rendering.rays.intersections import SPHERE
 from rigid_envs.rendering.rays.kernel import make_draw
 from rigid_envs.rendering.rays.light import SUN_FRAME, TO_SUN, sun_points
 from rigid_envs.rendering.rays.shadows import MOST_CELLS
@@ -155,7 +154,7 @@ class Renderer:
         if primitives is not None:
             solids = np.concatenate([solids, primitives], axis=1)
         glass, decals, polygons = stacked(overlays, worlds)
-        glass = np.concatenate([faint, glass], axis=1)
+        glass = np.concatenate([faint, glass], axis=1) if faint.size else glass
         far = np.linalg.norm(glass["position"] - self.camera.eye, axis=2)
         order = np.argsort(-far, axis=1, kind="stable")  # far ones first
         glass = np.take_along_axis(glass, order, axis=1)
@@ -183,24 +182,21 @@ class Renderer:
 
     def _tables(self, items: Sequence[Item], worlds: int) -> tuple[Array, Array]:
         """Primitives [worlds, n] of solids, and [worlds, g] of those that are see-through."""
-        opaque: list[tuple[Item, Array]] = []
-        faint: list[tuple[Item, Array]] = []
-        for item in items:
-            local = shape_primitives(item.shape).copy()
-            local["opacity"] = item.opacity if item.particles is None else _FAINT
-            (opaque if item.opacity == 1.0 and item.particles is None else faint).append(
-                (item, local)
-            )
-            if item.particles is not None:
-                opaque.append((item, balls(item.particles.positions, item.particles.radius)))
-        solids = _placed(opaque, worlds)
-        if any(item.particles is not None for item in items):
-            depth = (solids["position"] - self.camera.eye) @ self.camera.axes[2]
-            least = _LEAST_BALL * np.maximum(depth, 0.0) * self._view["pixel"][0]
-            least *= solids["kind"] == SPHERE
-            for field in (solids["size"][..., 0], solids["reach"]):
-                np.maximum(field, least, out=field)
-        return solids, _placed(faint, worlds)
+        solids = _placed([item for item in items if _opaque(item)], worlds)
+        faint = _placed([item for item in items if not _opaque(item)], worlds)
+        local = {
+            item: balls(item.particles.positions, item.particles.radius)
+            for item in items
+            if item.particles is not None
+        }
+        if not local:
+            return solids, faint
+        grains = _at_poses(list(local), list(local.values()), worlds)
+        depth = (grains["position"] - self.camera.eye) @ self.camera.axes[2]
+        least = _LEAST_BALL * np.maximum(depth, 0.0) * self._view["pixel"][0]
+        for field in (grains["size"][..., 0], grains["reach"]):
+            np.maximum(field, least, out=field)
+        return np.concatenate([solids, grains], axis=1), faint
 
     def _working_memory(self, count: int) -> tuple[Array, ...]:
         """Of this thread, for `count` primitives."""
@@ -211,30 +207,42 @@ class Renderer:
                 np.empty((*size, 3), np.uint8), np.empty((9, 2), np.int64),
                 np.empty(MOST_CELLS**2 + 1, np.int32),
             )  # fmt: skip
+            memory.spans = np.empty((self.height, 2), np.int64)
             memory.entries = np.empty(0, np.int32)
         if len(memory.entries) < listed:
             memory.entries = np.empty(listed, np.int32)
-        return *memory.pixels, memory.entries
+            memory.slabs = np.empty((count, len(self._points) + 1, 6))
+        return *memory.pixels, memory.entries, memory.slabs, memory.spans
 
 
-def _placed(parts: list[tuple[Item, Array]], worlds: int) -> Array:
-    """Primitives [worlds, n] of items, of which each has its own in its frame."""
-    if not parts:
+def _opaque(item: Item) -> bool:
+    return item.opacity == 1.0 and item.particles is None
+
+
+def _placed(items: list[Item], worlds: int) -> Array:
+    """Primitives [worlds, n] of the items' shapes."""
+    return _at_poses(items, [shape_primitives(item.shape) for item in items], worlds)
+
+
+def _at_poses(items: list[Item], parts: list[Array], worlds: int) -> Array:
+    """Primitives [worlds, n] of items, of which each has its part of them in its own frame."""
+    if not items:
         return np.zeros((worlds, 0), PRIMITIVE)
-    counts = [len(local) for _, local in parts]
-    local = np.concatenate([local for _, local in parts])
-    local["color"] = np.repeat([item.color for item, _ in parts], counts, axis=0)
-    local["solid"] = np.repeat([item.solid for item, _ in parts], counts)
-    position = _of_worlds([item.position for item, _ in parts], (worlds, 3))
-    turn = rotation_matrix(_of_worlds([item.orientation for item, _ in parts], (worlds, 4)))
-    size = _of_worlds([item.size for item, _ in parts], (worlds,))
-    which = np.repeat(np.arange(len(parts)), counts)
-    return placed(local, position[:, which], turn[:, which], size[:, which])
-
-
-def _of_worlds(values: Sequence[Any], shape: tuple[int, ...]) -> Array:
-    """[worlds, items, ...] of values that are those of all worlds, or of each."""
-    return np.stack([np.broadcast_to(value, shape) for value in values], axis=1)
+    count = len(items)
+    position, turn, size = (np.empty((worlds, count, *end)) for end in ((3,), (4,), ()))
+    for k, item in enumerate(items):
+        position[:, k], turn[:, k], size[:, k] = item.position, item.orientation, item.size
+    which = np.repeat(np.arange(count), [len(part) for part in parts])
+    local = np.empty(len(which), PRIMITIVE)
+    last = 0
+    for item, part in zip(items, parts, strict=True):
+        first, last = last, last + len(part)
+        own = local[first:last]
+        own[:] = part
+        own["color"], own["solid"] = item.color, item.solid
+        if not _opaque(item):
+            own["opacity"] = item.opacity if item.particles is None else _FAINT
+    return placed(local, position[:, which], rotation_matrix(turn)[:, which], size[:, which])
 
 
 def _renderer(

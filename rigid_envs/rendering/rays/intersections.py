@@ -11,7 +11,7 @@ import math
 from physics.compiler.jit import stage
 
 SPHERE, BOX, CAPSULE, CYLINDER, TORUS, TRIANGLE = range(6)
-_FAR = 1e300
+FAR = 1e300  # in place of 1 / 0
 _STEPS = 40  # at most, along a ray to a torus; rays that meet it need about ten
 _CLOSE = 1e-9  # of a torus's reach, where a ray has met it
 
@@ -34,9 +34,9 @@ def ray_and_sphere(ox, oy, oz, ex, ey, ez, radius):
 @stage
 def ray_and_box(ox, oy, oz, ex, ey, ez, a, b, c):
     """A box of half extents a, b, c about the origin: the ray is within three slabs at once."""
-    ix = 1.0 / ex if ex != 0.0 else _FAR
-    iy = 1.0 / ey if ey != 0.0 else _FAR
-    iz = 1.0 / ez if ez != 0.0 else _FAR
+    ix = 1.0 / ex if ex != 0.0 else FAR
+    iy = 1.0 / ey if ey != 0.0 else FAR
+    iz = 1.0 / ez if ez != 0.0 else FAR
     mx, my, mz = -ox * ix, -oy * iy, -oz * iz
     hx, hy, hz = abs(ix) * a, abs(iy) * b, abs(iz) * c
     near = max(mx - hx, max(my - hy, mz - hz))
@@ -89,7 +89,7 @@ def ray_and_capsule(ox, oy, oz, ex, ey, ez, radius, half_length):
 def ray_and_cylinder(ox, oy, oz, ex, ey, ez, radius, half_length):
     """A cylinder about z with flat ends: the ray is within the tube and the slab at once."""
     low, high = ray_and_tube(ox, oy, ex, ey, radius)
-    iz = 1.0 / ez if ez != 0.0 else _FAR
+    iz = 1.0 / ez if ez != 0.0 else FAR
     mz, hz = -oz * iz, abs(iz) * half_length
     near, far = max(low, mz - hz), min(high, mz + hz)
     t = math.inf if (near > far) | (far < 0.0) else max(near, 0.0)
@@ -125,7 +125,7 @@ def ray_and_torus(ox, oy, oz, ex, ey, ez, ring, radius):
     k = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
     reach = ring + radius
     low, high = ray_and_tube(ox, oy, ex, ey, reach)
-    iz = 1.0 / ez if ez != 0.0 else _FAR
+    iz = 1.0 / ez if ez != 0.0 else FAR
     mz, hz = -oz * iz, abs(iz) * radius
     t, end = max(low, max(mz - hz, 0.0)), min(high, mz + hz)  # within a cylinder around it
     gap = math.inf
@@ -169,7 +169,10 @@ def intersection(kind, a, b, c, ox, oy, oz, ex, ey, ez):
 
 @stage
 def grown(kind, a, b, c, by):
-    """The size of a solid shape that holds all points within a distance of one of that size."""
+    """The size of a solid shape that holds all points within a distance of one of that size.
+
+    For a negative distance, of one that these hold: see `solid`.
+    """
     if kind == BOX:
         return a + by, b + by, c + by
     if kind == CYLINDER:
@@ -177,6 +180,16 @@ def grown(kind, a, b, c, by):
     if kind == TORUS:
         return a, b + by, c
     return a + by, b, c
+
+
+@stage
+def solid(kind, a, b, c):
+    """Whether a shape that `grown` has shrunk has anything left; not for a torus."""
+    if kind == BOX:
+        return (a > 0.0) & (b > 0.0) & (c > 0.0)
+    if kind == CYLINDER:
+        return (a > 0.0) & (b > 0.0)
+    return a > 0.0
 
 
 @stage

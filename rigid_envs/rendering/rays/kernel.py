@@ -8,7 +8,7 @@ from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
 from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import large_entry
 from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
-from rigid_envs.rendering.rays.shading import around_both, paint, smooth
+from rigid_envs.rendering.rays.shading import paint, smooth
 from rigid_envs.rendering.rays.shadows import find_shadows
 from rigid_envs.rendering.rays.visibility import find_nearest
 
@@ -33,9 +33,9 @@ def make_draw() -> Any:
         tiles: [rows, columns, 3], picture of the empty ground.
         tile_depth: [rows, columns] m, its depth; infinite above the horizon.
         smooths: whether borders are smoothed.
-        depth, shown, hidden, ground, around, starts, entries: working memory: [rows, columns] of
-            numbers, integers and bytes, [rows, columns, 3] bytes, [9, 2] integers, and that of
-            `find_shadows`.
+        depth, shown, hidden, ground, around, starts, entries, slabs, spans: working memory: [rows,
+            columns] of numbers, integers and bytes, [rows, columns, 3] bytes, [9, 2] integers, and
+            that of `find_shadows`.
         rgb: [worlds, rows, columns, 3] bytes, is written.
         depths: [worlds, rows, columns] m, is written; of no worlds if it isn't wanted.
         solids: [worlds, rows, columns], the solids that are seen; likewise.
@@ -46,8 +46,8 @@ def make_draw() -> Any:
     @large_entry
     def draw(
         first, last, primitives, order, glass, decals, polygons, camera, sun_frame, points, tiles,
-        tile_depth, smooths, depth, shown, hidden, ground, around, starts, entries, rgb, depths,
-        solids, ground_solid,
+        tile_depth, smooths, depth, shown, hidden, ground, around, starts, entries, slabs, spans,
+        rgb, depths, solids, ground_solid,
     ):  # fmt: skip
         _ = sources
         rows, columns = depth.shape
@@ -58,11 +58,11 @@ def make_draw() -> Any:
                     depth[row, column] = tile_depth[row, column]
                     shown[row, column] = -1
                     hidden[row, column] = 0
-            borders = find_nearest(primitives[w], view, depth, shown)
+            find_nearest(primitives[w], view, depth, shown)
             if rgb.shape[0] > 0:
-                shaded = find_shadows(
+                find_shadows(
                     primitives[w], order[w], view, sun_frame, points, depth, shown, starts,
-                    entries, hidden,
+                    entries, slabs, spans, hidden,
                 )  # fmt: skip
                 below = tiles
                 if decals.shape[1] > 0:
@@ -72,13 +72,10 @@ def make_draw() -> Any:
                             for k in range(3):
                                 ground[row, column, k] = tiles[row, column, k]
                     draw_decals(decals[w], view, ground)
-                paint(
-                    primitives[w], view, sun, samples, shown, hidden, below,
-                    around_both(borders, shaded), rgb[w],
-                )  # fmt: skip
+                paint(primitives[w], view, sun, samples, shown, hidden, below, spans, rgb[w])
                 if smooths:
                     smooth(
-                        primitives[w], view, sun, samples, shown, hidden, below, around, borders,
+                        primitives[w], view, sun, samples, shown, hidden, below, around, spans,
                         rgb[w],
                     )  # fmt: skip
                 draw_glass(glass[w], view, sun, depth, rgb[w])

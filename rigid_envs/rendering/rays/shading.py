@@ -52,17 +52,7 @@ def byte(value):
 
 
 @stage
-def around_both(a, b):
-    """The rectangle around two, of which one may be empty."""
-    if (a[0] >= a[1]) | (a[2] >= a[3]):
-        return b
-    if (b[0] >= b[1]) | (b[2] >= b[3]):
-        return a
-    return min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
-
-
-@stage
-def paint(primitives, camera, sun, samples, shown, hidden, ground, borders, rgb):
+def paint(primitives, camera, sun, samples, shown, hidden, ground, spans, rgb):
     """Colours all pixels.
 
     Args:
@@ -73,7 +63,7 @@ def paint(primitives, camera, sun, samples, shown, hidden, ground, borders, rgb)
         shown: [rows, columns], which primitive, or -1.
         hidden: [rows, columns], bits of the hidden points of the sun.
         ground: [rows, columns, 3], colours of the empty ground and the sky.
-        borders: first and last row and column (exclusive) of solids and shadows.
+        spans: [rows, 2], first and last column (exclusive) of solids and shadows in each row.
         rgb: [rows, columns, 3], is written.
     """
     rows, columns = shown.shape
@@ -81,9 +71,8 @@ def paint(primitives, camera, sun, samples, shown, hidden, ground, borders, rgb)
         for column in range(columns):
             for k in range(3):
                 rgb[row, column, k] = ground[row, column, k]
-    top, bottom, left, right = borders
-    for row in range(top, bottom):
-        for column in range(left, right):
+    for row in range(rows):
+        for column in range(spans[row, 0], spans[row, 1]):
             n = shown[row, column]
             if n < 0:
                 if hidden[row, column] != 0:
@@ -105,21 +94,21 @@ _LOOKS = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
 
 
 @stage
-def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, borders, rgb):
+def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, spans, rgb):
     """Colours the pixels at borders again, as the mean of four looks at each.
 
     A pixel at a border shows what its neighbours show: the nearest of these primitives is sought at
     each of the four places. Their share of the sun is that of the neighbour.
 
     The arguments are those of `paint`; and `around` [9, 2] is working memory: what the neighbours
-    show, and which points of the sun are hidden there; `borders`: first and last row and column
-    (exclusive) of the solids.
+    show, and which points of the sun are hidden there.
     """
     rows, columns = shown.shape
-    top, bottom, left, right = borders
-    for row in range(max(top - 1, 0), min(bottom + 1, rows)):
+    for row in range(rows):
         above, below = max(row - 1, 0), min(row + 1, rows - 1)
-        for column in range(max(left - 1, 0), min(right + 1, columns)):
+        left = min(spans[above, 0], min(spans[row, 0], spans[below, 0])) - 1
+        right = max(spans[above, 1], max(spans[row, 1], spans[below, 1])) + 1
+        for column in range(max(left, 0), min(right, columns)):
             n, before, after = shown[row, column], max(column - 1, 0), min(column + 1, columns - 1)
             same = (shown[above, column] == n) & (shown[below, column] == n)
             if same & (shown[row, before] == n) & (shown[row, after] == n):

@@ -8,7 +8,15 @@ cell can hide.
 import math
 
 from physics.compiler.jit import stage
-from rigid_envs.rendering.rays.intersections import TORUS, TRIANGLE, grown, intersection
+from rigid_envs.rendering.rays.intersections import (
+    BOX,
+    FAR,
+    TORUS,
+    TRIANGLE,
+    grown,
+    intersection,
+    solid,
+)
 from rigid_envs.rendering.rays.light import SUN_SIZE
 from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
 
@@ -124,12 +132,23 @@ def sort_into_cells(primitives, order, frame, spread, starts, entries):
 
 
 @stage
-def shaded_pixels(primitives, camera, sun, spread, rows, columns):
-    """First and last row and column (exclusive) of the pixels that any shadow may reach.
+def find_spans(primitives, camera, sun, spread, columns, spans):
+    """First and last column (exclusive) of the pixels in each row that show solids or shadows.
 
-    A primitive's shadow lies between the sphere around it and that sphere's shadow on the ground.
+    Every pixel shows a solid, within the sphere around it, or the ground, which only that sphere's
+    shadow can reach.
+
+    Args:
+        primitives: [n], of PRIMITIVE.
+        camera: a record of CAMERA.
+        sun: [3], unit vector.
+        spread: half-width of the sun over its distance.
+        columns: of the picture.
+        spans: [rows, 2], is written.
     """
-    top, bottom, left, right = rows, 0, columns, 0
+    rows = len(spans)
+    for row in range(rows):
+        spans[row, 0], spans[row, 1] = columns, 0
     for n in range(len(primitives)):
         p = primitives[n]
         x, y, z, reach = p.position[0], p.position[1], p.position[2], p.reach
@@ -139,15 +158,15 @@ def shaded_pixels(primitives, camera, sun, spread, rows, columns):
                 way = max(z, 0.0) / sun[2]
                 radius = (reach + spread * way) / sun[2]
                 x, y, z = x - way * sun[0], y - way * sun[1], 0.0
-            row, last_row, column, last_column = bounds(camera, x, y, z, radius, rows, columns)
-            if (last_row > row) & (last_column > column):
-                top, bottom = min(top, row), max(bottom, last_row)
-                left, right = min(left, column), max(right, last_column)
-    return top, bottom, left, right
+            top, bottom, left, right = bounds(camera, x, y, z, radius, rows, columns)
+            for row in range(top, bottom):
+                spans[row, 0], spans[row, 1] = min(spans[row, 0], left), max(spans[row, 1], right)
 
 
 @stage
-def find_shadows(primitives, order, camera, frame, points, depth, shown, starts, entries, hidden):
+def find_shadows(
+    primitives, order, camera, frame, points, depth, shown, starts, entries, slabs, spans, hidden
+):
     """Which points of the sun are hidden from what each pixel shows.
 
     Args:
@@ -160,29 +179,31 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
         shown: [rows, columns], which primitive, or -1.
         starts: [MOST_CELLS^2 + 1], working memory.
         entries: [at least n], working memory.
+        slabs: [at least n, samples + 1, 6], working memory.
+        spans: [rows, 2], is written, see `find_spans`.
         hidden: [rows, columns], of a bit for each sample; at first 0.
-
-    Returns:
-        First and last row and column (exclusive) of what was changed.
     """
-    if len(primitives) == 0:
-        return 0, 0, 0, 0
     spread = SUN_SIZE if len(points) > 1 else 0.0
+    find_spans(primitives, camera, frame[2], spread, depth.shape[1], spans)
+    if len(primitives) == 0:
+        return
     sun, every, largest = frame[2], (1 << len(points)) - 1, 0.0
     for n in range(len(primitives)):
         largest = max(largest, primitives[n].reach)
+        if primitives[n].kind == BOX:
+            for s in range(len(points)):
+                _slabs(primitives[n], points[s, 0], points[s, 1], points[s, 2], slabs[n, s])
+            _slabs(primitives[n], sun[0], sun[1], sun[2], slabs[n, len(points)])
     left, low, cell, side = sort_into_cells(primitives, order, frame, spread, starts, entries)
-    rows, columns = depth.shape
-    top, bottom, first, last = shaded_pixels(primitives, camera, sun, spread, rows, columns)
     per_cell = 1.0 / cell
     ex, ey, ez = camera.eye[0], camera.eye[1], camera.eye[2]
     eye_u, eye_v = _across(frame, ex, ey, ez)
     across_u, across_v = _across(frame, camera.axes[0, 0], camera.axes[0, 1], camera.axes[0, 2])
-    for row in range(top, bottom):
+    for row in range(len(spans)):
         # a pixel's place across the light is linear in its column and its depth
         dx, dy, dz = sight(camera, row + 0.5, camera.half_width)
         row_u, row_v = _across(frame, dx, dy, dz)
-        for column in range(first, last):
+        for column in range(spans[row, 0], spans[row, 1]):
             t = depth[row, column]
             if t == math.inf:
                 continue
@@ -208,28 +229,79 @@ def find_shadows(primitives, order, camera, frame, points, depth, shown, starts,
                 itself = (own == entries[k]) & (not hollow)
                 if itself | (way < -p.reach) | (aside > room * room):
                     continue
-                found |= _hidden_by(p, x, y, z, points, sun, spread, max(way, 0.0))
+                found |= _hidden_by(
+                    p, x, y, z, points, slabs[entries[k]], sun, spread, max(way, 0.0)
+                )
                 if found == every:
                     break
             hidden[row, column] = found
-    return top, bottom, first, last
 
 
 @stage
-def _hidden_by(p, x, y, z, points, sun, spread, way):
+def _slabs(p, ex, ey, ez, slabs):
+    """Of a box and rays along a direction: what doesn't depend on where the rays begin.
+
+    `slabs` [6]: the inverse of the direction's components, and half the time within each pair of
+    the box's planes. A component of 0 has a very large inverse.
+    """
+    dx, dy, dz = turned_into(p, ex, ey, ez)
+    for k, e in enumerate((dx, dy, dz)):
+        slabs[k] = 1.0 / e if e != 0.0 else FAR
+        slabs[k + 3] = abs(slabs[k]) * p.size[k]
+
+
+@stage
+def _meets_box(ox, oy, oz, least, slabs, by):
+    """Whether a ray from (ox, oy, oz) meets a box that is larger by `by`, from `least` on."""
+    mx, my, mz = -ox * slabs[0], -oy * slabs[1], -oz * slabs[2]
+    hx = slabs[3] + by * abs(slabs[0])
+    hy = slabs[4] + by * abs(slabs[1])
+    hz = slabs[5] + by * abs(slabs[2])
+    near = max(mx - hx, max(my - hy, mz - hz))
+    far = min(mx + hx, min(my + hy, mz + hz))
+    return (near <= far) & (far >= least)
+
+
+@stage
+def _hidden_by_box(p, ox, oy, oz, samples, slabs, aside):
+    """As `_hidden_by`, in the box's frame; `slabs` [samples + 1, 6], the last is of the middle."""
+    least, found = _CLOSE * p.reach, 0
+    if aside > 0.0:
+        if not _meets_box(ox, oy, oz, 0.0, slabs[samples], aside):
+            return found
+        thick = min(p.size[0], min(p.size[1], p.size[2])) > aside
+        if thick and _meets_box(ox, oy, oz, 0.0, slabs[samples], -aside):
+            return (1 << samples) - 1
+    for s in range(samples):
+        found |= _meets_box(ox, oy, oz, least, slabs[s], 0.0) << s
+    return found
+
+
+@stage
+def _hidden_by(p, x, y, z, points, slabs, sun, spread, way):
     """Bits of the points of the sun that a primitive hides from a point of a surface.
 
     The rays to all points pass the primitive within `spread` times the distance of the middle one:
-    if that misses the primitive grown by so much, none is hidden.
+    if that misses the primitive grown by so much, none is hidden; if it meets the primitive shrunk
+    by so much, all are.
     """
     ox, oy, oz = seen_from(p, x, y, z)
+    aside = spread * (way + p.reach)
+    if p.kind == BOX:
+        return _hidden_by_box(p, ox, oy, oz, len(points), slabs, aside)
     least, found = _CLOSE * p.reach, 0
     if (spread > 0.0) & (p.kind != TRIANGLE):
         ex, ey, ez = turned_into(p, sun[0], sun[1], sun[2])
-        a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], spread * (way + p.reach))
+        a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], aside)
         at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
         if at == math.inf:
             return found
+        if p.kind != TORUS:
+            a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], -aside)
+            if solid(p.kind, a, b, c):
+                at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
+                if at < math.inf:
+                    return (1 << len(points)) - 1
     for s in range(len(points)):
         ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
         at, _, _, _ = intersection(

@@ -120,20 +120,12 @@ def find_nearest(primitives, camera, depth, shown):
         camera: a record of CAMERA.
         depth: [rows, columns] m; at first that of the ground, infinite above the horizon.
         shown: [rows, columns], at first -1: the ground, or nothing.
-
-    Returns:
-        First and last row and column (exclusive) of what was changed.
     """
     rows, columns = depth.shape
-    first_row, last_row, first_column, last_column = rows, 0, columns, 0
     A = camera.axes
     for n in range(len(primitives)):
         p = primitives[n]
         top, bottom, left, right = pixels_of(p, camera, rows, columns)
-        if (top >= bottom) | (left >= right):
-            continue
-        first_row, last_row = min(first_row, top), max(last_row, bottom)
-        first_column, last_column = min(first_column, left), max(last_column, right)
         kind, a, b, c = p.kind, p.size[0], p.size[1], p.size[2]
         ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
         rx, ry, rz = turned_into(p, A[0, 0], A[0, 1], A[0, 2])
@@ -150,4 +142,3 @@ def find_nearest(primitives, camera, depth, shown):
                 if (t < depth[row, column]) & (t > camera.near):
                     depth[row, column] = t
                     shown[row, column] = n
-    return first_row, last_row, first_column, last_column
