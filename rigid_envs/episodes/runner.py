@@ -7,21 +7,20 @@ import numpy as np
 from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Scene, Snapshot, World
-from physics.compiler.jit import columns
-from physics.scene.validation import choice, instance
+from physics.scene.validation import choice
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
-from rigid_envs.episodes.columns import clip_actions, split
+from rigid_envs.episodes.columns import clip_actions
 from rigid_envs.episodes.draws import uniform
+from rigid_envs.episodes.observations import Observation, Observations
 from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
-from rigid_envs.episodes.task_checks import check_goals, check_terms, check_written
+from rigid_envs.episodes.task_checks import check_goals, check_terms
 from rigid_envs.tasks import Task
 from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS
 
 Array = np.ndarray
-Observation = dict[str, Array]
 
 STATE_VERSION = 2
 
@@ -103,43 +102,19 @@ class Runner:
         self.reward = reward.with_time_penalty() if self.terminate_on_success else reward
         self._has_task_terms = bool(self.reward.task_terms)
 
-        self.observe_parameters: bool = instance("observe_parameters", observe_parameters, bool)
-        if self.observe_parameters and not self.randomization.bounds:
-            raise ValueError(
-                "observe_parameters needs randomize: its ranges are the bounds of the observed "
-                "parameters"
-            )
-        parameter_bounds = self.randomization.bounds if self.observe_parameters else ()
-        self.observe_task_guide: bool = instance("observe_task_guide", observe_task_guide, bool)
-        guide_bounds = self.task.guide_bounds if self.observe_task_guide else ()
-        # options append components, so that the indices of the others do not change
-        self.bounds = (*self.task.bounds, *parameter_bounds, *guide_bounds)
-        low, high = _limits(self.bounds)
-        goal_low, goal_high = _limits(self.task.goal_bounds)
-        self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
-        observed: dict[str, spaces.Space[Any]] = {
-            "observation": spaces.Box(low, high, dtype=np.float32),
-            "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
-            "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
-        }
-        self._keeps_state = pixels is not None and pixels.keeps_state
-        self._pixels: Pixels | None = None
-        if pixels is not None:
-            self._pixels = Pixels(self, pixels)
-            if self._keeps_state:
-                observed["state"] = observed["observation"]
-            observed["observation"] = self._pixels.space
-        self.observation_space = spaces.Dict(observed)
+        self._observations = Observations(self, observe_parameters, observe_task_guide, pixels)
+        self.bounds, self.observation_space = self._observations.bounds, self._observations.space
+        self._pixels = self._observations.pixels
         size = (len(self.task.actions),)
         self.action_space = spaces.Box(-1.0, 1.0, size, dtype=np.float32)
 
         self._seeds = np.zeros(count, dtype=np.int64)
         self._episodes = np.full(count, -1, dtype=np.int64)
-        self._seeded = self._observed = False
+        self._seeded = self._terms_checked = False
         self._elapsed = np.zeros(count, dtype=np.int64)
         self._now = self.world.read()
         self._goal_distance = np.zeros(count)
-        self._goals = np.zeros((count, len(goal_low)), dtype=np.float32, order="F")
+        self._goals = np.zeros((count, len(self.task.goal_bounds)), dtype=np.float32, order="F")
 
     def _worlds(
         self,
@@ -194,7 +169,7 @@ class Runner:
             self.randomization.set_ranges(mask, None)
             return
         ranges = self.randomization.check(randomize)
-        if self.observe_parameters:
+        if self._observations.parameters:
             self.randomization.check_observed(ranges)
         if self.randomization.needs_per_world_parameters(ranges):
             self.use_per_world_parameters()
@@ -287,45 +262,14 @@ class Runner:
         goals for which the reward terms were computed. `compute_reward` compares them with the
         goals that it gets.
         """
-        now, goal_start, task_end = self._now, len(self.bounds), len(self.task.bounds)
-        guide_start = goal_start
-        if self.observe_task_guide:
-            guide_start -= len(self.task.guide_bounds)
-        table = columns((len(self._low),), self.count, np.float32)
-        values = table.T[: self.count]
-        if not self._observed:
-            table[...] = np.nan
-        self.task.observe(self.world, now, values[:, :task_end])
-        if not self._observed:
-            check_written(self.task, "observe", self.task.bounds, values[:, :task_end])
-        if self.observe_parameters:
-            values[:, task_end:guide_start] = self.randomization.observed
-        achieved, desired = values[:, goal_start:], self._goals
-        goals = self.task.achieved(self.world, now)
-        achieved[...] = check_goals(self.task, "achieved", goals, self.count)
-        if self.observe_task_guide:
-            guide = values[:, guide_start:goal_start]
-            self.task.guide(self.world, now, achieved, desired, guide)
-            if not self._observed:
-                check_written(self.task, "guide", self.task.guide_bounds, guide)
         joins = self.reward_type == "dense" and self._has_task_terms
-        rows = split(table, self._low, self._high, desired, joins)
+        observation, rows, achieved = self._observations.observe(self._now, self._goals, joins)
         self._goal_distance = rows.goal_distance
-        # one row per world, as users expect
-        observation = {
-            "observation": rows.observation,
-            "achieved_goal": rows.achieved,
-            "desired_goal": rows.desired,
-        }
-        if self._pixels:
-            if self._keeps_state:
-                observation["state"] = rows.observation
-            observation["observation"] = self._pixels.observe()
         success: Array = self.reward.success(self._goal_distance)
-        terms = self.task.terms(self.world, now, achieved, desired, self._goal_distance)
-        if not self._observed:
+        terms = self.task.terms(self.world, self._now, achieved, self._goals, self._goal_distance)
+        if not self._terms_checked:
             check_terms(self.task, terms, self.count)
-        self._observed = True
+        self._terms_checked = True
         info: dict[str, Array] = {
             "is_success": success,
             "success": success,
@@ -475,9 +419,3 @@ class Runner:
         self._seeded = bool(np.all(self._episodes >= 0))
         if self._pixels:
             self._pixels.set_state(state["pixels"])
-
-
-def _limits(bounds: tuple[tuple[str, str, float, float], ...]) -> tuple[Array, Array]:
-    """Low and high [n] of bounds."""
-    low = np.array([b[2] for b in bounds], dtype=np.float32)
-    return low, np.array([b[3] for b in bounds], dtype=np.float32)

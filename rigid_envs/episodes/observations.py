@@ -1,0 +1,127 @@
+"""What is observed of the worlds: its space, and its values after each step."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium import spaces
+
+from physics import Readout
+from physics.compiler.jit import columns
+from physics.scene.validation import instance
+from rigid_envs.episodes.columns import Observed, split
+from rigid_envs.episodes.pixels import Pixels, PixelSettings
+from rigid_envs.episodes.task_checks import check_goals, check_written
+from rigid_envs.tasks.task import Bounds
+
+if TYPE_CHECKING:
+    from rigid_envs.episodes.runner import Runner
+
+Array = np.ndarray
+Observation = dict[str, Array]
+
+
+class Observations:
+    """Observations of a runner's worlds.
+
+    Args:
+        runner: whose worlds.
+        parameters: whether the drawn parameters are appended, see `Randomization`.
+        guide: whether the task's guide is appended, see `Task.guide`.
+        pixels: what pixels are observed; None if only the state is.
+
+    Attributes:
+        parameters: see above.
+        bounds: (name, unit, low, high) of each component of the state.
+        space: of one world's observation.
+        pixels: what draws the observed pixels, if any are.
+
+    Raises:
+        TypeError, ValueError: `parameters` or `guide` is no bool, or no parameters are drawn.
+    """
+
+    def __init__(
+        self, runner: "Runner", parameters: bool, guide: bool, pixels: PixelSettings | None
+    ) -> None:
+        self._runner, self._task = runner, runner.task
+        self.parameters: bool = instance("observe_parameters", parameters, bool)
+        if self.parameters and not runner.randomization.bounds:
+            raise ValueError(
+                "observe_parameters needs randomize: its ranges are the bounds of the observed "
+                "parameters"
+            )
+        parameter_bounds = runner.randomization.bounds if self.parameters else ()
+        self._guide: bool = instance("observe_task_guide", guide, bool)
+        guide_bounds = self._task.guide_bounds if self._guide else ()
+        # options append components, so that the indices of the others do not change
+        self.bounds: Bounds = (*self._task.bounds, *parameter_bounds, *guide_bounds)
+        low, high = _limits(self.bounds)
+        goal_low, goal_high = _limits(self._task.goal_bounds)
+        self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
+        observed: dict[str, spaces.Space[Any]] = {
+            "observation": spaces.Box(low, high, dtype=np.float32),
+            "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+            "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+        }
+        self._keeps_state = pixels is not None and pixels.keeps_state
+        self.pixels: Pixels | None = None
+        if pixels is not None:
+            self.pixels = Pixels(runner, pixels)
+            if self._keeps_state:
+                observed["state"] = observed["observation"]
+            observed["observation"] = self.pixels.space
+        self.space = spaces.Dict(observed)
+        self._checked = False
+
+    def observe(
+        self, now: Readout, desired: Array, joins: bool
+    ) -> tuple[Observation, Observed, Array]:
+        """Observations of all worlds.
+
+        The first ones are checked: a task must write every component.
+
+        Args:
+            now: the worlds' state.
+            desired: [count, goal], the desired goals.
+            joins: whether to write `Observed.goals`.
+
+        Returns:
+            The observations, what else `split` tells, and the achieved goals [count, goal].
+        """
+        task, world, count = self._task, self._runner.world, self._runner.count
+        goal_start, task_end = len(self.bounds), len(task.bounds)
+        guide_start = goal_start - (len(task.guide_bounds) if self._guide else 0)
+        table = columns((len(self._low),), count, np.float32)
+        values = table.T[:count]
+        if not self._checked:
+            table[...] = np.nan
+        task.observe(world, now, values[:, :task_end])
+        if not self._checked:
+            check_written(task, "observe", task.bounds, values[:, :task_end])
+        if self.parameters:
+            values[:, task_end:guide_start] = self._runner.randomization.observed
+        achieved = values[:, goal_start:]
+        achieved[...] = check_goals(task, "achieved", task.achieved(world, now), count)
+        if self._guide:
+            guide = values[:, guide_start:goal_start]
+            task.guide(world, now, achieved, desired, guide)
+            if not self._checked:
+                check_written(task, "guide", task.guide_bounds, guide)
+        self._checked = True
+        rows = split(table, self._low, self._high, desired, joins)
+        # one row per world, as users expect
+        observation = {
+            "observation": rows.observation,
+            "achieved_goal": rows.achieved,
+            "desired_goal": rows.desired,
+        }
+        if self.pixels:
+            if self._keeps_state:
+                observation["state"] = rows.observation
+            observation["observation"] = self.pixels.observe()
+        return observation, rows, achieved
+
+
+def _limits(bounds: Bounds) -> tuple[Array, Array]:
+    """Low and high [n] of bounds."""
+    low = np.array([b[2] for b in bounds], dtype=np.float32)
+    return low, np.array([b[3] for b in bounds], dtype=np.float32)
