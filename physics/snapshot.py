@@ -41,8 +41,8 @@ def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | N
         limits: check parameters that differ from the present ones; None: don't.
 
     Raises:
-        ValueError: a snapshot of other worlds; parameters for which the substep is too long. The
-            state is then unchanged.
+        ValueError: a snapshot of other worlds; parameters that `ParameterLimits` refuses. The state
+            is then unchanged.
     """
     what = _difference(simulation, saved)
     if what:

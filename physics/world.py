@@ -301,10 +301,10 @@ class World:
         return Parameters(*(np.broadcast_to(values, shape).copy() for values in own))
 
     def check_parameters(self, ranges: Mapping[str, Any]) -> None:
-        """Raises an error if the substep is too long for parameters within ranges.
+        """Raises an error if the scene can't be simulated with parameters within ranges.
 
         The ends of the ranges are checked: all bodies at one end, and each in turn at the other.
-        Values within the last checked ranges are not checked again by `set_parameters`.
+        For values within the last checked ranges `set_parameters` doesn't check the substep again.
 
         Args:
             ranges: (low, high) of "mass", "friction", "restitution" or "size": numbers, or
@@ -348,8 +348,8 @@ class World:
 
         Raises:
             ValueError: the World was built without `per_world_parameters`; a wrong shape, a value
-                out of range, or one for which the substep is too long. The parameters are then
-                unchanged.
+                out of range, one for which the substep is too long, or a mass too small for what
+                presses on the body. The parameters are then unchanged.
         """
         if not self.features.per_world_parameters:
             raise ValueError(
@@ -376,8 +376,8 @@ class World:
         """Returns all worlds to a snapshot of a World of the same scene, fidelity and count.
 
         Raises:
-            TypeError, ValueError: not a snapshot of such a World; parameters for which the substep
-                is too long, as a World with `allow_unstable` can have. The state is then unchanged.
+            TypeError, ValueError: not a snapshot of such a World; parameters that `set_parameters`
+                refuses, as a World with `allow_unstable` can have. The state is then unchanged.
         """
         instance("saved", saved, Snapshot)
         limits = None if self._allow_unstable else self._limits

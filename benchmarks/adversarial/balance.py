@@ -6,8 +6,9 @@ springs of contacts, and work W of the servos,
     K + U + V  <=  (K + U + V at the start) + W,
 
 for friction, damping and inelastic impacts only take energy. What exceeds it by more than 1e-3 of
-the servos' work, in absolute values, or 1 mJ is a failure. 1 mJ lifts the cube of 0.1 kg by 1 mm; a
-heavier body is allowed as much as lifts it by 1 mm.
+the servos' work, in absolute values, or 1 mJ is a failure. 1 mJ lifts the cube of 0.1 kg by 1 mm;
+in a world with a heavier body, as much is allowed as lifts that by 1 mm, so that a smaller gain of
+a light body beside it is not seen.
 
 While a spring contact lasts, the energy of the kick-drift-kick steps oscillates by up to
 (omega h)^2 / 4 of V, and returns when it ends (omega h is Fidelity.contact_resolution, at most). As

@@ -63,9 +63,12 @@ class MeasuredRunner(Runner):
             draws = uniform(self._seeds[mask], self._episodes[mask], bodies, _MASS_STREAM)
             factors = 10.0 ** (DECADES * (2.0 * draws - 1.0))
             drawn = self.world.parameters.pick(mask)._replace(mass=self._masses * factors)
-            for _ in range(bodies):  # a body that is made heavier presses the others harder
+            while True:  # a body that is made heavier presses harder on the others
                 least = self._loads.least_masses(drawn)
-                drawn = drawn._replace(mass=np.maximum(drawn.mass, least))
+                light = (drawn.mass < least * (1.0 - 1e-12)).any(axis=1)
+                if not light.any():
+                    break
+                drawn.mass[light] = np.maximum(drawn.mass, least)[light]
             self.world.set_parameters(mass=drawn.mass, worlds=mask)
 
     def start_episode(self, seed: int, episode: int) -> None:

@@ -1,4 +1,4 @@
-"""Checks before per-world parameters are used that the substep is short enough for them."""
+"""Checks before per-world parameters are used that the scene can be simulated with them."""
 
 from functools import cached_property
 from typing import Any
@@ -35,7 +35,7 @@ class ParameterLimits:
             high: [1, bodies], high ends.
 
         Raises:
-            ValueError: the substep is too long for parameters in the range.
+            ValueError: the substep is too long for parameters in the range, or a body too light.
         """
         bodies = len(self._scene.bodies)
         least = np.eye(bodies, dtype=bool)  # each body at its least beside the heaviest others
@@ -53,7 +53,7 @@ class ParameterLimits:
             worlds: [n], indices of the worlds.
 
         Raises:
-            ValueError: the substep is too long for the parameters of a world.
+            ValueError: the substep is too long for the parameters of a world, or a body too light.
         """
         self.loads.check(new, worlds)
         low, high = (

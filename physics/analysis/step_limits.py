@@ -45,7 +45,7 @@ def check_range(scene: Scene, fidelity: Fidelity, low: Parameters, high: Paramet
     material gives a stiffness it follows from the masses, and only the smallest body can sink.
     """
     _check_spacing(scene, fidelity, low, high, "")
-    if not _given_stiffness(scene):
+    if not given_stiffness(scene):
         smallest = Parameters.of(scene)._replace(size=low.size)
         _check_built(scene, fidelity, smallest, "size")
         return
@@ -111,7 +111,7 @@ def _below(x: float) -> str:
 def _check_sink(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     """Raises an error if a body at rest would sink into a static by half its width."""
     h, gravity, bodies = fidelity.substep, math.hypot(*scene.gravity), len(scene.bodies)
-    if _given_stiffness(scene):
+    if given_stiffness(scene):
         return
     for half_pair in model.half_pair:
         i = int(half_pair["owner"])
@@ -153,7 +153,7 @@ def _check_fields(scene: Scene, fidelity: Fidelity, model: Model) -> None:
 
 
 def _check_stiffness(scene: Scene, fidelity: Fidelity, model: Model, features: Features) -> None:
-    given = _given_stiffness(scene)
+    given = given_stiffness(scene)
     if not given:
         return
     h = fidelity.substep
@@ -174,7 +174,7 @@ def largest_safe_step(
     Where no material gives a stiffness it counts for contacts as stiff as at the present substep.
     """
     step, limiting = _safe_step(scene, fidelity, model, features)
-    if fidelity.substep > step and _given_stiffness(scene):
+    if fidelity.substep > step and given_stiffness(scene):
         for _ in range(8):  # the damping of friction depends slightly on the step
             model, _ = build(scene, replace(fidelity, substep=step))
             step, limiting = _safe_step(scene, fidelity, model, features)
@@ -186,7 +186,7 @@ def cause_of_divergence(
 ) -> str:
     """The likely cause of worlds becoming non-finite at a substep of h s."""
     step, limiting = _safe_step(scene, fidelity, model, features)
-    if h > step and _given_stiffness(scene):
+    if h > step and given_stiffness(scene):
         return (
             f"the substep of {h:g} s is longer than the largest safe one, {_below(step)} s, which "
             f"{limiting} limits"
@@ -194,7 +194,7 @@ def cause_of_divergence(
     return "a state, speed or force too large for double precision"
 
 
-def _given_stiffness(scene: Scene) -> list[float]:
+def given_stiffness(scene: Scene) -> list[float]:
     """Stiffness in N/m of the materials that give one."""
     solids = (*scene.bodies, *scene.statics, *scene.driven_bodies)
     return [x.material.stiffness for x in solids if x.material.stiffness is not None]

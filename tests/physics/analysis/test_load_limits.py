@@ -18,10 +18,12 @@ from physics import (
     World,
 )
 from physics.analysis.load_limits import LoadLimits
+from physics.analysis.parameter_limits import ParameterLimits
 from physics.reference import scenes
 from physics.scene.parameters import Parameters
 
-FORCE, MASS, FREQUENCY, WIDTH = 20.0, 0.3, 60.0, 0.04  # of scenes.push_like
+FORCE, MASS, FREQUENCY, DEPTH = 20.0, 0.3, 60.0, 0.03  # of scenes.push_like
+OMEGA = 0.5 / 2e-3  # 1/s, at balanced
 
 
 def limits(scene, fidelity="balanced"):
@@ -53,11 +55,11 @@ def test_least_mass_is_that_of_the_spring_that_stops_a_drive(fidelity):
     settings = PRESETS[fidelity]
     omega = settings.contact_resolution / settings.substep
     energy = 0.5 * MASS * (FORCE / (MASS * FREQUENCY)) ** 2
-    expected = 2.0 * (FORCE * WIDTH + energy) / (WIDTH * omega) ** 2
+    expected = 2.0 * (FORCE * DEPTH + energy) / (DEPTH * omega) ** 2
     np.testing.assert_allclose(least(scenes.push_like(1.0), fidelity), expected, rtol=1e-12)
 
 
-def test_the_spring_of_the_least_mass_stops_a_load_after_one_width():
+def test_the_spring_of_the_least_mass_stops_a_load_at_its_depth():
     """m x'' = F - k x from rest at F / k, and from the speed of the energy that the load has."""
     k = 1000.0
     force, energy = 3.0, 0.1
@@ -68,15 +70,14 @@ def test_the_spring_of_the_least_mass_stops_a_load_after_one_width():
 @pytest.mark.parametrize("fidelity", ["fast", "balanced"])
 def test_a_drive_presses_the_centre_of_a_cube_to_the_ground_at_about_the_least_mass(fidelity):
     (lightest,) = least(scenes.push_like(1.0), fidelity)
-    assert pressed(3.0 * lightest, fidelity) > 0.05 * WIDTH
+    assert pressed(3.0 * lightest, fidelity) > 0.002
     assert pressed(0.3 * lightest, fidelity) < 0.0
 
 
 def test_a_heavier_body_on_top_counts():
     scene = scenes.two_cubes(ground=0.0, gravity=9.81)
-    omega = 0.5 / 2e-3
     masses = least(scene, mass=[0.1, 200.0])
-    np.testing.assert_allclose(masses[0], 2.0 * 200.0 * 9.81 / (WIDTH * omega**2), rtol=1e-12)
+    np.testing.assert_allclose(masses[0], 2.0 * 200.0 * 9.81 / (DEPTH * OMEGA**2), rtol=1e-12)
     assert masses[1] < 0.2
     world = World(scene, count=2, per_world_parameters=True)
     with pytest.raises(ValueError, match=r"mass 0\.1 kg of body 0 in world 1 is too small.*body 1"):
@@ -86,14 +87,52 @@ def test_a_heavier_body_on_top_counts():
     np.testing.assert_array_equal(world.parameters.mass, 0.1)
 
 
+def test_loads_add_up():
+    """All bodies may lie on one, and a drive press on the topmost."""
+    cubes = [Body(Box((0.02,) * 3), mass=0.1, position=(0, 0, 0.02 + 0.04 * i)) for i in range(5)]
+    drive = Drive(Sphere(0.015), MASS, FORCE, (0.0, 0.0, 0.3))
+    alone, loaded = Scene(cubes, [Ground()]), Scene(cubes, [Ground()], [drive])
+    masses = [1.0, 5.0, 5.0, 5.0, 5.0]
+    weight = 2.0 * 20.0 * 9.81 / DEPTH / OMEGA**2
+    np.testing.assert_allclose(least(alone, mass=masses)[0], weight, rtol=1e-12)
+    one = least(scenes.push_like(1.0))[0]
+    np.testing.assert_allclose(least(loaded, mass=masses)[0], weight + one, rtol=1e-12)
+
+
+def test_what_a_range_accepts_is_accepted_anywhere_in_it():
+    """Also where the scene's own body is lighter than it should be."""
+    light = Body(Box((0.02,) * 3), mass=0.002, position=(0.0, 0.0, 0.02))
+    heavy = Body(Box((0.02,) * 3), mass=0.1, position=(0.1, 0.0, 0.02))
+    drive = Drive(Sphere(0.015), MASS, FORCE, (0.0, 0.0, 0.1))
+    bounds = ParameterLimits(Scene([light, heavy], [Ground()], [drive]), PRESETS["balanced"])
+    own = Parameters.of(Scene([light, heavy]))
+    draw, accepted = np.random.default_rng(0), 0
+    for _ in range(2000):
+        ends = np.sort(10.0 ** draw.uniform(-0.3, 1.5, (2, 1, 2)), axis=0) * own.mass
+        sizes = np.sort(draw.uniform(0.8, 1.6, (2, 1, 1)), axis=0) * np.ones((1, 2))
+        low, high = (own._replace(mass=m, size=z) for m, z in zip(ends, sizes, strict=True))
+        try:
+            bounds.check_range(low, high)
+        except ValueError:
+            continue
+        accepted += 1
+        share = draw.random((2, 50, 2))
+        inside = Parameters.of(Scene([light, heavy]), 50)._replace(
+            mass=low.mass + share[0] * (high.mass - low.mass),
+            size=low.size + share[1] * (high.size - low.size),
+        )
+        bounds.loads.check(inside)
+    assert 50 < accepted < 1000
+
+
 def test_message_says_what_would_be_right():
     world = World(scenes.push_like(), per_world_parameters=True)
     with pytest.raises(ValueError, match=r"mass 0\.001 kg of body 0 in world 0 ") as error:
         world.set_parameters(mass=1e-3)
     message = str(error.value)
     assert (
-        "is too small for Fidelity.substep 0.002 s: drive 0 could press it through what it lies "
-        "on, by its width of 0.04 m; use at least 0.0" in message
+        "is too small for Fidelity.substep 0.002 s: drive 0 could press it into what it lies on "
+        "by 0.75 of its width of 0.04 m; use at least 0.0" in message
     )
     world.set_parameters(mass=float(message.split("at least ")[1].split(" kg")[0]))
 

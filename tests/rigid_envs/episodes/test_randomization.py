@@ -156,7 +156,7 @@ def test_where_a_ball_of_another_size_would_land_is_known():
 @pytest.mark.parametrize("env_id", [STACK, THROW])
 def test_a_start_of_another_size_does_not_depend_on_other_worlds(env_id):
     """Nor do the steps after it. The test above does the same for Push, with more steps."""
-    ranges = {**RANGES, "size": (0.75, 1.4)}
+    ranges = {**RANGES, "size": (0.8, 1.4)}
     many = gym.make_vec(env_id, num_envs=9, randomize=ranges)
     seen = [many.reset(seed=5)[0]]
     moves = actions(15, 9, size=4)
