@@ -32,7 +32,7 @@ class RigidEnv(gym.Env[Observation, Array]):
         height: of a frame in pixels.
         camera: where frames are taken from: "task", "follow", "front", "side", "back" or "top", a
             dict with position, target (m) or field_of_view (degrees), or a Camera; the task's own
-            if None. "follow" follows the achieved goal, for frames alone.
+            if None. With "follow" frames follow the achieved goal; pixels that are observed do not.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
         max_episode_steps: number of steps after which an episode is truncated; the task's number if

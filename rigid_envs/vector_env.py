@@ -38,7 +38,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         height: of a world's frame in pixels.
         camera: where frames are taken from: "task", "follow", "front", "side", "back" or "top", a
             dict with position, target (m) or field_of_view (degrees), or a Camera; the task's own
-            if None. "follow" follows the achieved goal, for frames alone.
+            if None. With "follow" frames follow the achieved goal; pixels that are observed do not.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
         render_worlds: largest number of worlds to draw; the first ones are drawn.

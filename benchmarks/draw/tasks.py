@@ -14,7 +14,7 @@ from PIL import Image
 from benchmarks.report.provenance import ROOT
 from training.policies.policy_file import read_policy
 from training.results.gif import GifWriter
-from training.results.video import film_env
+from training.results.video import make_video_env
 from training.scripted import controller_for
 
 Array = np.ndarray
@@ -84,7 +84,7 @@ def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> It
     """Frames of an episode: one at the start, and one after each step."""
     env_id, own, act = _player(task, arguments)
     shown = {"width": size, "height": size, "max_episode_steps": -1}
-    with closing(film_env(env_id, {**own, **shown})) as env:
+    with closing(make_video_env(env_id, {**own, **shown})) as env:
         observation, _ = env.reset(seed=seed)
         yield np.asarray(env.render())
         for _ in range(steps):

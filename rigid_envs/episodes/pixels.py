@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 from physics.scene.validation import choice, integer
 from rigid_envs.rendering import scene_view
-from rigid_envs.rendering.cameras import FOLLOW, choose_camera
+from rigid_envs.rendering.cameras import choose_camera
 from rigid_envs.rendering.renderer import Frames, Renderer
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class PixelSettings(NamedTuple):
         width: pixels.
         height: pixels.
         frame_stack: how many steps a picture shows.
-        camera: a name, a Camera or its settings, see `choose_camera`.
+        camera: a name, a Camera or its settings, see `choose_camera`; it stands still.
     """
 
     keeps_state: bool
@@ -57,10 +57,10 @@ def pixel_settings(
         pixels: one of `CHANNELS`, or several.
         pixel_size: width and height in pixels, or (width, height).
         frame_stack: how many steps a picture shows.
-        camera: see `choose_camera`; it must not move.
+        camera: see `choose_camera`.
 
     Raises:
-        TypeError, ValueError: an unknown name, a number out of its range, or a camera that moves.
+        TypeError, ValueError: an unknown name, or a number out of its range.
     """
     choice("obs_type", obs_type, OBSERVATION_TYPES)
     kinds = _check_kinds(pixels)
@@ -77,11 +77,6 @@ def pixel_settings(
                     f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "state"'
                 )
         return None
-    if isinstance(camera, str) and camera == FOLLOW:
-        raise ValueError(
-            f'camera="{FOLLOW}" moves, and is for frames alone; obs_type={obs_type!r} needs one '
-            'that stands still, such as "task"'
-        )
     return PixelSettings(obs_type == "pixels+state", kinds, width, height, stack, camera)
 
 

@@ -223,6 +223,7 @@ class Runner:
         old, per_world = self.world, self.world.features.per_world_parameters
         new = self._worlds(old.scene, fidelity, self.count, old.threads, per_world)
         if per_world:
+            self.randomization.check_step(new, self._ranges)
             new.set_parameters(**old.parameters._asdict())
         new.set_state(
             position=old.position,

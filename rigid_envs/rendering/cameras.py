@@ -12,9 +12,11 @@ Array = np.ndarray
 # azimuth and elevation in degrees of the eye, about what the task's own camera looks at
 NAMED = {"front": (-90.0, 20.0), "side": (0.0, 20.0), "back": (90.0, 20.0), "top": (-90.0, 90.0)}
 FIELDS = ("position", "target", "field_of_view")
-# follows a place from nearer: the share of the own camera's distance, that of the way from there
-# to the goal at which it looks, and that of the picture in which both are
-FOLLOW, NEAR, AHEAD, USED = "follow", 0.6, 1.0 / 3.0, 0.85
+FOLLOW = "follow"  # the own camera, which moves along with a place
+NEAR = 0.6  # of its own distance
+AHEAD = 1.0 / 3.0  # where it looks: of the way from the place to the goal
+USED = 0.85  # of the picture, in which both are
+LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 
 def choose_camera(given: Any, own: Camera) -> Camera:
@@ -50,20 +52,24 @@ def choose_camera(given: Any, own: Camera) -> Camera:
     return Camera(**{name: getattr(own, name) for name in FIELDS} | dict(given))
 
 
-def following(own: Camera, place: Array, goal: Array) -> Camera:
+def following(
+    own: Camera, place: Array, goal: Array, floor: float = 0.0, shape: float = 1.0
+) -> Camera:
     """The task's camera, nearer, and moved along with a place; it sees the place and the goal.
 
     Args:
         own: the task's camera.
         place: (3,) m, what is to reach the goal.
         goal: (3,) m.
+        floor: m, height of the ground.
+        shape: width over height of the picture.
     """
     target = place + AHEAD * (goal - place)
-    target[2] = max(target[2], 0.0)  # whatever falls, the eye stays above the ground
-    around = tuple(target.tolist())
-    fitting = _fitting(around, own, np.array([place, goal]), USED)
-    distance = max(NEAR * own.distance, fitting)
-    return Camera.around(around, distance, own.azimuth, own.elevation, own.field_of_view)
+    target[2] = max(target[2], floor)
+    around, elevation = tuple(target.tolist()), max(own.elevation, LEVEL)
+    view = Camera.around(around, 1.0, own.azimuth, elevation, own.field_of_view)
+    distance = max(NEAR * own.distance, _fitting(view, np.array([place, goal]), USED, shape))
+    return Camera.around(around, distance, own.azimuth, elevation, own.field_of_view)
 
 
 def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0) -> Camera:
@@ -80,12 +86,20 @@ def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 3
         [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     )
     target = tuple((0.5 * (low + high)).tolist())
-    own = Camera.around(target, 1.0, azimuth, elevation)
-    return Camera.around(target, _fitting(target, own, corners), azimuth, elevation)
+    view = Camera.around(target, 1.0, azimuth, elevation)
+    return Camera.around(target, _fitting(view, corners), azimuth, elevation)
 
 
-def _fitting(target: tuple[float, ...], own: Camera, points: Array, used: float = 1.0) -> float:
-    """m, least distance from a target at which points are within a share of a square picture."""
-    local = (points - target) @ own.axes.T  # across the picture, and into it
-    slope = used * np.tan(0.5 * np.radians(own.field_of_view))
-    return float((np.abs(local[:, :2]).max(axis=1) / slope - local[:, 2]).max())
+def _fitting(view: Camera, points: Array, used: float = 1.0, shape: float = 1.0) -> float:
+    """m, the least distance from its target at which a camera sees points.
+
+    Args:
+        view: how it looks at its target.
+        points: [n, 3] m.
+        used: fraction of the picture within which they are to be.
+        shape: width over height of the picture.
+    """
+    local = (points - view.target) @ view.axes.T  # across the picture, and into it
+    slope = used * np.tan(0.5 * np.radians(view.field_of_view))
+    across = np.maximum(np.abs(local[:, 0]) / shape, np.abs(local[:, 1]))
+    return float((across / slope - local[:, 2]).max())

@@ -100,8 +100,8 @@ class Pictures:
     def _draw(self, width: int, height: int) -> tuple[Array, ...]:
         if self._follows:
             return tuple(
-                self._frames(self._looking(self._following(world), width, height), [world])[0]
-                for world in range(self._count)
+                self._frames(self._looking(camera, width, height), [world])[0]
+                for world, camera in enumerate(self._following(width / height))
             )
         if self._renderer is None:
             self._renderer = self._looking(self.camera, width, height)
@@ -111,14 +111,18 @@ class Pictures:
         threads = self._runner.world.threads
         return Renderer(width, height, camera, floor=self._floor, threads=threads)
 
-    def _following(self, world: int) -> Camera:
-        """The camera that follows what is to reach the goal; the first body if it is no place."""
-        engine, task = self._runner.world, self._runner.task
+    def _following(self, shape: float) -> list[Camera]:
+        """For each world a camera that follows what is to reach the goal."""
+        engine, task, goals = self._runner.world, self._runner.task, self._runner.goals
         if [unit for _, unit, _, _ in task.goal_bounds[:3]] == ["m"] * 3:
-            place = task.achieved(engine, engine.read())[world, :3]
-            return following(self.camera, place, self._runner.goals[world, :3])
-        body = engine.position[world, 0]
-        return following(self.camera, body, body)
+            places = task.achieved(engine, engine.read())[: self._count, :3]
+            goals = goals[: self._count, :3]
+        else:  # a goal that is no place
+            places = goals = engine.read().position[: self._count, 0]
+        return [
+            following(self.camera, place, goal, self._floor or 0.0, shape)
+            for place, goal in zip(places, goals, strict=True)
+        ]
 
     def _frames(self, renderer: Renderer, worlds: Sequence[int]) -> Array:
         """[n, height, width, 3] uint8 of some worlds."""

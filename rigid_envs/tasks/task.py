@@ -36,8 +36,8 @@ class Task(ABC):
         draw_count: how many random numbers the start of an episode needs.
         reward: the success threshold and the weights of the dense reward.
         camera: the camera of rendered frames. It should see the whole workspace.
-        film_camera: the name of the camera of recorded videos: "follow" where a body is small
-            beside its way.
+        video_camera: the name of the camera of recorded videos: "follow" where a body is small
+            compared with its path.
         size_range: smallest and largest factor of body sizes that `start` supports when each world
             has its own sizes; None if the task supports only the sizes of its scene.
     """
@@ -50,7 +50,7 @@ class Task(ABC):
     draw_count: int
     reward: Reward
     camera: Camera = Camera()
-    film_camera: str = "task"
+    video_camera: str = "task"
     size_range: tuple[float, float] | None = None
 
     @property

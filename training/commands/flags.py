@@ -130,7 +130,7 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
 
 
 def add_latest(parser: argparse.ArgumentParser) -> None:
-    """Flags that select the latest run, or describe a model.zip outside a run folder."""
+    """Flags that select the run started last, or describe a model.zip outside a run folder."""
     parser.add_argument(
         "--algo",
         help="algorithm: ppo or sac (default: that of the policy or of the run started last)",
@@ -145,7 +145,7 @@ def add_latest(parser: argparse.ArgumentParser) -> None:
 def add_export(parser: argparse.ArgumentParser) -> None:
     """Flags of export."""
     parser.add_argument(
-        "policy", nargs="?", metavar="RUN", help="run folder (default: the latest run)"
+        "policy", nargs="?", metavar="RUN", help="run folder (default: the run started last)"
     )
     add_latest(parser)
     parser.add_argument(
@@ -174,8 +174,8 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="RUN",
-        help="run folder (default: the latest run); several runs are plotted with their mean and "
-        "range",
+        help="run folder (default: the run started last); several runs are plotted with their mean "
+        "and range",
     )
     parser.set_defaults(policy=None)
     add_latest(parser)

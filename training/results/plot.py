@@ -93,7 +93,9 @@ def draw_learning_curves(
     right.set(xlabel="environment steps / million")
     if len(curves) > 1:  # above the plots, where it hides nothing
         lines, names = right.get_legend_handles_labels()
-        figure.legend(lines, names, loc="outside upper right", ncols=len(names), fontsize="small")
+        figure.legend(
+            lines, names, loc="outside upper right", ncols=min(len(names), 4), fontsize="small"
+        )
     figure.suptitle(title, x=0.01, ha="left")
     image.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(image, dpi=120)

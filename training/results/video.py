@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from rigid_envs.tasks import Task
 from training.policies.policy import Policy
 from training.results.evaluate import FIRST_SEED
 from training.results.gif import WIDTH, GifWriter
@@ -41,7 +42,7 @@ def record(
         quiet: Show no progress.
         gif_width: Width of a GIF in pixels; an mp4 has the size of the frames.
         env_kwargs: Arguments of the environment that replace those of training; without "camera",
-            the task's own choice for videos films.
+            the camera is `Task.video_camera`.
 
     Returns:
         The paths of the video and of the still image, which shows the middle of the first episode.
@@ -51,7 +52,7 @@ def record(
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
-    env = film_env(policy.env_id, {**policy.env_kwargs, **env_kwargs})
+    env = make_video_env(policy.env_id, {**policy.env_kwargs, **env_kwargs})
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())
@@ -65,18 +66,19 @@ def record(
     return video, still
 
 
-def film_env(env_id: str, arguments: dict[str, Any]) -> gym.Env:
-    """The single environment with frames from `arguments["camera"]`, or the task's film camera.
+def make_video_env(env_id: str, arguments: dict[str, Any]) -> gym.Env:
+    """The single environment with frames from `arguments["camera"]`, or the task's video camera.
 
     Raises:
         UsageError: As `make_single_env`.
     """
-    env = make_single_env(env_id, **arguments, render_mode="rgb_array")
+    arguments = {**arguments, "render_mode": "rgb_array"}
+    env = make_single_env(env_id, **arguments)
     task = getattr(env.unwrapped, "task", None)
-    if "camera" in arguments or task is None or task.film_camera == "task":
+    if "camera" in arguments or not isinstance(task, Task) or task.video_camera == "task":
         return env
     env.close()
-    return make_single_env(env_id, **arguments, render_mode="rgb_array", camera=task.film_camera)
+    return make_single_env(env_id, **arguments, camera=task.video_camera)
 
 
 def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:

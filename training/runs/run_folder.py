@@ -130,8 +130,8 @@ def create_run_folder(log_folder: Path, config: TrainConfig) -> RunFolder:
     Raises:
         UsageError: The folder cannot be created or written.
     """
-    number = 1 + max((n for n, _ in _runs(log_folder, config.algo, config.env_id)), default=0)
-    parent = log_folder / config.algo
+    parent, own = log_folder / config.algo, folder_name(config.env_id)
+    number = 1 + max((n for name, n, _ in _runs(parent) if name == own), default=0)
     try:
         parent.mkdir(parents=True, exist_ok=True)
         path = _make_next(parent / folder_name(config.env_id), number)
@@ -160,10 +160,11 @@ def latest_run(log_folder: Path, algo: str | None = None, env_id: str | None = N
         UsageError: There is none.
     """
     runs = [
-        (description.stat().st_mtime_ns, int(number), description.parent)
-        for description in log_folder.glob(f"{algo or '*'}/*/run.json")
-        for name, _, number in [description.parent.name.rpartition("_")]
-        if number.isdecimal() and (env_id is None or name == folder_name(env_id))
+        ((path / "run.json").stat().st_mtime_ns, number, path)
+        for folder in log_folder.glob(algo or "*")
+        for name, number, path in _runs(folder)
+        if env_id is None or name == folder_name(env_id)
+        if (path / "run.json").exists()
     ]
     if not runs:
         wanted = (f" of {algo}" if algo else "") + (f" on {env_id}" if env_id else "")
@@ -251,14 +252,10 @@ def _write_text(path: Path, text: str) -> None:
         file.write(text.encode("utf-8"))
 
 
-def _runs(log_folder: Path, algo: str, env_id: str) -> list[tuple[int, Path]]:
-    """Number and path of each run of the algorithm on the environment."""
-    prefix = folder_name(env_id) + "_"
-    return [
-        (int(path.name.removeprefix(prefix)), path)
-        for path in (log_folder / algo).glob(f"{prefix}*")
-        if path.name.removeprefix(prefix).isdecimal()
-    ]
+def _runs(folder: Path) -> list[tuple[str, int, Path]]:
+    """Of each run of an algorithm: the environment as part of a folder name, number and path."""
+    split = ((path.name.rpartition("_"), path) for path in folder.glob("*_*"))
+    return [(name, int(number), path) for (name, _, number), path in split if number.isdecimal()]
 
 
 def _git(source: Path, *words: str) -> str:

@@ -169,12 +169,7 @@ def intersection(kind, a, b, c, ox, oy, oz, ex, ey, ez):
 
 @stage
 def grown(kind, a, b, c, by):
-    """The size of a solid shape that holds all points within a distance of one of that size.
-
-    For a negative distance, of one that these hold: see `solid`.
-    """
-    if kind == BOX:
-        return a + by, b + by, c + by
+    """The size of a round shape that holds all points within a distance of one of that size."""
     if kind == CYLINDER:
         return a + by, b + by, c
     if kind == TORUS:
@@ -183,13 +178,14 @@ def grown(kind, a, b, c, by):
 
 
 @stage
-def solid(kind, a, b, c):
-    """Whether a shape that `grown` has shrunk has anything left; not for a torus."""
-    if kind == BOX:
-        return (a > 0.0) & (b > 0.0) & (c > 0.0)
+def shrunk(kind, a, b, c, by):
+    """The size of a shape around which one of that size holds all points within a distance.
+
+    Of a sphere, capsule or cylinder; the radius is not positive if there is none.
+    """
     if kind == CYLINDER:
-        return (a > 0.0) & (b > 0.0)
-    return a > 0.0
+        return (a - by if b > by else 0.0), b - by, c
+    return a - by, b, c
 
 
 @stage

@@ -15,7 +15,7 @@ from rigid_envs.rendering.rays.intersections import (
     TRIANGLE,
     grown,
     intersection,
-    solid,
+    shrunk,
 )
 from rigid_envs.rendering.rays.light import SUN_SIZE
 from rigid_envs.rendering.rays.visibility import bounds, seen_from, sight, turned_into
@@ -156,7 +156,9 @@ def find_spans(primitives, camera, sun, spread, columns, spans):
             radius = reach
             if end == 1:
                 way = max(z, 0.0) / sun[2]
-                radius = (reach + spread * way) / sun[2]
+                # rays to the sun's lowest point are the flattest
+                low = sun[2] - spread * math.sqrt(1.0 - sun[2] * sun[2])
+                radius = (reach + spread * way) / low
                 x, y, z = x - way * sun[0], y - way * sun[1], 0.0
             top, bottom, left, right = bounds(camera, x, y, z, radius, rows, columns)
             for row in range(top, bottom):
@@ -297,8 +299,8 @@ def _hidden_by(p, x, y, z, points, slabs, sun, spread, way):
         if at == math.inf:
             return found
         if p.kind != TORUS:
-            a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], -aside)
-            if solid(p.kind, a, b, c):
+            a, b, c = shrunk(p.kind, p.size[0], p.size[1], p.size[2], aside)
+            if a > 0.0:
                 at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
                 if at < math.inf:
                     return (1 << len(points)) - 1

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from physics import Box, Compound, Part, Sphere
+from physics import Box, Capsule, Compound, Cylinder, Part, Sphere, Torus
+from physics.rotation import rotation_matrix
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.rays.light import TO_SUN
-from rigid_envs.rendering.renderer import Renderer
+from rigid_envs.rendering.rays.light import GROUND_SHADOW, TO_SUN, sun_points
+from rigid_envs.rendering.renderer import SOFT, Renderer
 from rigid_envs.rendering.view import Item
 
 UPRIGHT, RED = (0.0, 0.0, 0.0, 1.0), (220, 40, 40)
@@ -32,6 +33,75 @@ def test_the_shadow_of_a_sphere_is_the_cylinder_along_the_light(height):
     dark = (found.rgb[0] != empty.rgb[0]).any(axis=-1)
     assert dark[ground].sum() > 20
     np.testing.assert_array_equal(dark[ground], (aside < radius)[ground])
+
+
+def meets(shape, origin, direction):
+    """Whether rays [n, 3] in a shape's frame meet it, by points every 0.4 mm near its centre."""
+    t = -(origin @ direction) + np.linspace(-0.08, 0.08, 400)[:, None]
+    t = t[..., None]
+    x, y, z = np.moveaxis(origin + t * direction, -1, 0)
+    if isinstance(shape, Sphere):
+        inside = x * x + y * y + z * z < shape.radius**2
+    elif isinstance(shape, Box):
+        a, b, c = shape.half_extents
+        inside = (np.abs(x) < a) & (np.abs(y) < b) & (np.abs(z) < c)
+    elif isinstance(shape, Cylinder):
+        inside = (x * x + y * y < shape.radius**2) & (np.abs(z) < shape.half_length)
+    elif isinstance(shape, Capsule):
+        end = z - np.clip(z, -shape.half_length, shape.half_length)
+        inside = x * x + y * y + end * end < shape.radius**2
+    else:
+        ring = np.hypot(x, y) - shape.major_radius
+        inside = ring * ring + z * z < shape.minor_radius**2
+    return inside.any(axis=0)
+
+
+SHAPES = [
+    Sphere(0.04), Box((0.05, 0.03, 0.02)), Capsule(0.025, 0.04), Cylinder(0.03, 0.03),
+    Torus(0.04, 0.012),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+@pytest.mark.parametrize("height", [0.08, 0.25])
+def test_a_soft_shadow_is_the_fraction_of_the_sun_that_is_hidden(shape, height):
+    """On the ground, seen from low down, against rays to every point of the sun."""
+    points, place = sun_points(SOFT), np.array((0.02, 0.03, height))
+    below = place - place[2] / TO_SUN[2] * TO_SUN
+    low = Camera.around(tuple(below.tolist()), 0.6, 20.0, 20.0, 30.0)
+    pictures = [
+        Renderer(96, 96, low, smooth=False).frames(items, depth=True, solid=True)
+        for items in ([Item(shape, place, TURNED, RED)], [])
+    ]
+    found, empty = pictures
+    ground = (found.solid[0] < 0) & (found.depth[0] == empty.depth[0]) & (empty.depth[0] < 2.0)
+    seen = (low.eye + found.depth[0][..., None] * low.rays(96, 96))[ground]
+    turn = rotation_matrix(TURNED)
+    hidden = (
+        sum(
+            meets(shape, (seen - place) @ turn, point @ turn / np.linalg.norm(point))
+            for point in points
+        )
+        / SOFT
+    )
+    tiles = empty.rgb[0][ground].astype(float)
+    expected = tiles * (1.0 - hidden[:, None] * GROUND_SHADOW)
+    off = np.abs(found.rgb[0][ground] - expected).max(axis=-1)
+    assert (hidden == 1.0).any() or height > 0.1
+    assert ((hidden > 0.0) & (hidden < 1.0)).sum() > 50
+    # a point of the sun is an eighth, 10 of 255 levels; at its rim rounding decides
+    assert (off > 2.0).sum() <= 0.03 * (hidden > 0.0).sum()
+
+
+def test_a_renderer_draws_any_number_of_solids_one_after_another():
+    renderer, draw = Renderer(SIZE, SIZE, CAMERA), np.random.default_rng(0)
+    for count in (0, 3, 50, 1):
+        items = [
+            Item(SHAPES[n % 5], draw.uniform((-0.2, -0.2, 0.05), 0.2), TURNED, RED)
+            for n in range(count)
+        ]
+        fresh = Renderer(SIZE, SIZE, CAMERA).frame(items)
+        np.testing.assert_array_equal(renderer.frame(items), fresh)
 
 
 @pytest.mark.parametrize("orientation", [UPRIGHT, TURNED], ids=["upright", "turned"])

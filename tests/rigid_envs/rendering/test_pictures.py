@@ -16,6 +16,7 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 
 from physics import World
 from rigid_envs.rendering import scene_view
+from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.cameras import following
 from rigid_envs.rendering.renderer import grid
 from rigid_envs.rendering.view import BODY_COLORS, Mark
@@ -330,3 +331,15 @@ def test_a_following_camera_moves_with_the_ball_of_each_world_until_it_lands():
     assert (moving._runner.world.position[:, 0, 0] > 1.0).all()
     corner = np.s_[:40, :40]  # of the sky and the ground beyond
     np.testing.assert_array_equal(moving.render()[0][corner], landed[0][corner])
+
+
+@pytest.mark.parametrize("shape", [0.5, 1.0, 2.0])
+def test_a_following_camera_sees_both_in_a_picture_of_any_shape_above_any_ground(shape):
+    own = Camera.around((0.0, 0.0, 0.6), 1.0, 30.0, 1.0)
+    place, goal = np.array([0.5, 0.0, -3.0]), np.array([-0.4, 0.3, 0.5])
+    assert following(own, place, goal, 0.5, shape).eye[2] > 0.5
+    place[2] = 0.6
+    camera = following(own, place, goal, 0.5, shape)
+    pixels, _ = camera.project(np.array([place, goal]), round(200 * shape), 200)
+    assert pixels.min() > 0
+    assert (pixels < [round(200 * shape), 200]).all()

@@ -1,13 +1,17 @@
 """Videos: mp4 and GIF, written without a display."""
 
+from contextlib import closing
+
+import gymnasium as gym
 import numpy as np
 import pytest
 from PIL import Image
 
 from tests.training.reach import straight_to_the_goal
 from training.policies.policy import Policy, scripted_policy
+from training.results import video as video_module
 from training.results.gif import GifWriter
-from training.results.video import record
+from training.results.video import make_video_env, record
 
 
 @pytest.fixture
@@ -79,3 +83,30 @@ def test_failure_leaves_no_gif(tmp_path, reach):
     with pytest.raises(RuntimeError, match="a bug"):
         record(Policy(fails, reach, "fails"), tmp_path / "video.gif", episodes=1, quiet=True)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_video_of_throw_follows_the_ball_unless_a_camera_is_given(tmp_path):
+    """Also with arguments that the video replaces, and where pixels are observed."""
+    throw = "RigidEnvs/Throw-v0"
+    frames = {}
+    for name, arguments in {
+        "default": {"render_mode": None},
+        "follow": {"camera": "follow"},
+        "task": {"camera": "task"},
+        "pixels": {"obs_type": "pixels", "pixel_size": 16},
+    }.items():
+        with closing(make_video_env(throw, {"fidelity": "fast", **arguments})) as env:
+            env.reset(seed=0)
+            frames[name] = env.render()
+    np.testing.assert_array_equal(frames["default"], frames["follow"])
+    np.testing.assert_array_equal(frames["pixels"], frames["follow"])
+    assert (frames["task"] != frames["follow"]).any()
+
+
+def test_an_environment_of_another_kind_is_filmed_as_it_is(monkeypatch, reach):
+    class Other(gym.Env):
+        task = "a name"
+
+    made = Other()
+    monkeypatch.setattr(video_module, "make_single_env", lambda env_id, **arguments: made)
+    assert make_video_env("Other-v0", {}) is made
