@@ -7,6 +7,7 @@ from rigid_envs.rendering.rays.intersections import SPHERE, intersection
 from rigid_envs.rendering.rays.light import brightness
 from rigid_envs.rendering.rays.visibility import (
     bounds,
+    pixels_of,
     seen_from,
     sight,
     turned_into,
@@ -66,9 +67,7 @@ def draw_glass(glass, camera, sun, depth, rgb):
     rows, columns = depth.shape
     for n in range(len(glass)):
         p = glass[n]
-        top, bottom, left, right = bounds(
-            camera, p.position[0], p.position[1], p.position[2], p.reach, rows, columns
-        )
+        top, bottom, left, right = pixels_of(p, camera, rows, columns)
         ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
         for row in range(top, bottom):
             for column in range(left, right):
@@ -118,10 +117,14 @@ def draw_polygons(polygons, rgb):
         if not inside:
             continue
         side = 1.0 if area > 0.0 else -1.0
+        per_edge = (
+            _per_length(q, 0, side), _per_length(q, 1, side), _per_length(q, 2, side),
+            _per_length(q, 3, side),
+        )  # fmt: skip
         for row in range(max(math.floor(low_y) - 1, 0), min(math.ceil(high_y) + 1, rows)):
             left, right = _reach(q, row - 0.5, row + 1.5)
             for column in range(max(math.floor(left) - 1, 0), min(math.ceil(right) + 1, columns)):
-                cover = min(max(_within(q, column + 0.5, row + 0.5, side) + 0.5, 0.0), 1.0)
+                cover = min(max(_within(q, column + 0.5, row + 0.5, per_edge) + 0.5, 0.0), 1.0)
                 if cover > 0.0:
                     blend(rgb, row, column, p.color, 1.0, 0.0, cover * p.opacity)
 
@@ -149,13 +152,21 @@ def _reach(q, top, bottom):
 
 
 @stage
-def _within(q, x, y, side):
+def _per_length(q, k, side):
+    """The inverse of an edge's length, with the sign of `side`; 0 for a point."""
+    m = (k + 1) % 4
+    ux, uy = q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]
+    length = math.sqrt(ux * ux + uy * uy)
+    return side / length if length > 1e-9 else 0.0
+
+
+@stage
+def _within(q, x, y, per_edge):
     """How far a point is within a convex polygon, negative outside of it."""
     inside = 1e9
     for k in range(4):
         m = (k + 1) % 4
         ux, uy = q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]
-        length = math.sqrt(ux * ux + uy * uy)
-        if length > 1e-9:
-            inside = min(inside, side * (ux * (y - q[k, 1]) - uy * (x - q[k, 0])) / length)
+        if per_edge[k] != 0.0:
+            inside = min(inside, per_edge[k] * (ux * (y - q[k, 1]) - uy * (x - q[k, 0])))
     return inside
