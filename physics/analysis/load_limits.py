@@ -70,8 +70,8 @@ class LoadLimits:
             if i >= bodies:
                 continue
             if j >= len(model.dynamic):
-                softest = float(min(row["stiffness"], row["sweep_stiffness"]))
-                self._stiffness[i] = min(self._stiffness[i], softest / self._own[0, i])
+                per_mass = float(row["stiffness"]) / self._own[0, i]
+                self._stiffness[i] = min(self._stiffness[i], per_mass)
             elif j >= bodies:
                 self._drives[i].add(drives[j - bodies])
             else:
