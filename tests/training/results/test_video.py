@@ -103,7 +103,7 @@ def test_a_video_of_throw_follows_the_ball_unless_a_camera_is_given(tmp_path):
     assert (frames["task"] != frames["follow"]).any()
 
 
-def test_an_environment_of_another_kind_is_filmed_as_it_is(monkeypatch, reach):
+def test_an_environment_of_another_kind_keeps_its_camera(monkeypatch, reach):
     class Other(gym.Env):
         task = "a name"
 
