@@ -43,16 +43,18 @@ SHARES: dict[str, dict[str, float]] = {
 
 
 def chunks_of(combinations: list[Combination], steps: float) -> list[tuple[Combination, int, int]]:
-    """(combination, number of the chunk, steps of all worlds) that make up `steps` in all."""
+    """(combination, number of the chunk, steps of all worlds) that make up `steps` in all.
+
+    All combinations advance in proportion, so that a run that is interrupted has tried each.
+    """
     whole = sum(SHARES[c.task][c.preset] for c in combinations)
     chunks = []
     for combination in combinations:
         share = SHARES[combination.task][combination.preset] / whole
-        left, number = max(1, round(share * steps / WORLDS)), 0
-        while left > 0:
-            chunks.append((combination, number, min(CHUNK, left)))
-            left, number = left - CHUNK, number + 1
-    return chunks
+        count = max(1, round(share * steps / WORLDS))
+        for number, first in enumerate(range(0, count, CHUNK)):
+            chunks.append((first / count, (combination, number, min(CHUNK, count - first))))
+    return [chunk for _, chunk in sorted(chunks, key=lambda pair: pair[0])]
 
 
 def run(combinations: list[Combination], steps: float, path: Path | None) -> Results:
