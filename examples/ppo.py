@@ -93,11 +93,9 @@ def train(options: argparse.Namespace) -> float:
     rewards, values = np.zeros((steps, worlds)), np.zeros((steps + 1, worlds))
     ends = np.zeros((steps, worlds), dtype=bool)
     start, success = time.perf_counter(), 0.0
-    threads = options.threads or torch.get_num_threads()
 
     for update in range(1, options.total_steps // (steps * worlds) + 1):
-        # collect: torch's threads would spin on the cores that the worlds need
-        torch.set_num_threads(1)
+        # collect
         solved = []
         with torch.no_grad():
             for t in range(steps):
@@ -131,7 +129,6 @@ def train(options: argparse.Namespace) -> float:
         batch = (x.flatten(0, 1), taken.flatten(0, 1), log_probs.flatten(), advantage, returns)
 
         # update: several passes over the batch
-        torch.set_num_threads(threads)
         for _ in range(options.epochs):
             for part in torch.randperm(steps * worlds).split(options.batch_size):
                 seen, action, before, gain, target = (whole[part] for whole in batch)
@@ -172,7 +169,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.95)
     parser.add_argument("--clip", type=float, default=0.2)
-    parser.add_argument("--threads", type=int, help="of updates (default: torch's)")
+    parser.add_argument("--threads", type=int, default=1, help="of torch; more need idle cores")
     parser.add_argument("--stop-at", type=float, default=0.97, help="success rate")
     return parser.parse_args(arguments)
 

@@ -6,14 +6,13 @@ import gymnasium as gym
 
 from rigid_envs.tasks import TASKS
 
+# names in ids: those of tasks
+NAMES = {"Push": "push", "Reach": "reach", "Slide": "slide", "Stack": "stack", "Throw": "throw"}
 # id: arguments of the environment
 ENVIRONMENTS: dict[str, dict[str, Any]] = {
-    "RigidEnvs/Push-v0": {"task": "push"},
-    "RigidEnvs/PushDense-v0": {"task": "push", "reward_type": "dense"},
-    "RigidEnvs/Stack-v0": {"task": "stack"},
-    "RigidEnvs/StackDense-v0": {"task": "stack", "reward_type": "dense"},
-    "RigidEnvs/Throw-v0": {"task": "throw"},
-    "RigidEnvs/ThrowDense-v0": {"task": "throw", "reward_type": "dense"},
+    f"RigidEnvs/{name}{kind}-v0": {"task": task, **reward}
+    for name, task in NAMES.items()
+    for kind, reward in {"": {}, "Dense": {"reward_type": "dense"}}.items()
 }
 
 

@@ -9,7 +9,7 @@ import pytest
 from physics.tuning import tune as tuning
 from rigid_envs import RigidEnv, RigidVectorEnv
 from rigid_envs.episodes.arguments import argument_names
-from rigid_envs.tasks import Push, Stack, Throw
+from rigid_envs.tasks import TASKS, Push, Reach, Slide, Stack, Throw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -45,7 +45,9 @@ def test_a_task_of_ones_own_takes_less_than_a_hundred_lines(capsys, tmp_path, mo
     assert len(task.splitlines()) < 100
 
 
-@pytest.mark.parametrize("task", [Push(), Stack(2), Throw()], ids=lambda t: type(t).__name__)
+@pytest.mark.parametrize(
+    "task", [Push(), Reach(), Slide(), Stack(2), Throw()], ids=lambda t: type(t).__name__
+)
 def test_the_observation_table_has_a_row_for_every_index(task):
     text = (ROOT / "docs" / "environments" / f"{type(task).__name__.lower()}.md").read_text()
     found = re.findall(r"^\| (\d+) \| ([^|]+) \| ([^|]*) \| (\S+) to (\S+) \|$", text, re.MULTILINE)
@@ -56,7 +58,7 @@ def test_the_observation_table_has_a_row_for_every_index(task):
     assert listed == [(i, *bound) for i, bound in enumerate(task.bounds)]
 
 
-@pytest.mark.parametrize("task", [Push, Stack, Throw], ids=lambda t: t.__name__)
+@pytest.mark.parametrize("task", TASKS.values(), ids=lambda t: t.__name__)
 def test_the_table_of_arguments_names_every_argument(task):
     text = (ROOT / "docs" / "environments" / f"{task.__name__.lower()}.md").read_text()
     table = text[text.index("## Arguments") : text.index("## Action")]

@@ -77,6 +77,10 @@ class Randomization:
         for name, value in ranges.items():
             choice("randomize", name, NAMES)
             field = f"randomize[{name!r}]"
+            if name != NOISE and not self._bodies:
+                raise ValueError(
+                    f"{field}: this task has no bodies, got {value!r}; only {NOISE!r} can be drawn"
+                )
             if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
                 if len(value) != 2:
                     raise ValueError(f"{field} must be (low, high) or a number, got {value!r}")

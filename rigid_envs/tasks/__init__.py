@@ -1,10 +1,18 @@
 """The tasks, one per file: initial state, actions, observation, goal and reward terms in NumPy."""
 
 from rigid_envs.tasks.push import Push
+from rigid_envs.tasks.reach import Reach
+from rigid_envs.tasks.slide import Slide
 from rigid_envs.tasks.stack import Stack
 from rigid_envs.tasks.task import Task
 from rigid_envs.tasks.throw import Throw
 
-TASKS: dict[str, type[Task]] = {"push": Push, "stack": Stack, "throw": Throw}
+TASKS: dict[str, type[Task]] = {
+    "push": Push,
+    "reach": Reach,
+    "slide": Slide,
+    "stack": Stack,
+    "throw": Throw,
+}
 
-__all__ = ["TASKS", "Push", "Stack", "Task", "Throw"]
+__all__ = ["TASKS", "Push", "Reach", "Slide", "Stack", "Task", "Throw"]

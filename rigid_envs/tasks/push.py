@@ -8,12 +8,10 @@ from physics import (
     Body,
     Capsule,
     Compound,
-    Drive,
     Ground,
     Material,
     Readout,
     Scene,
-    Sphere,
     Static,
     World,
 )
@@ -21,6 +19,7 @@ from physics.scene.validation import instance, integer
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import Goal, Marker
 from rigid_envs.tasks.block import HALF, Block
+from rigid_envs.tasks.finger import Finger
 from rigid_envs.tasks.rewards import Reward, distance
 from rigid_envs.tasks.task import Bounds, Task
 
@@ -31,11 +30,6 @@ THRESHOLD = 0.05  # m
 RANGE = 0.15  # m, largest offset of starts and goals from the origin along x and y
 # goals drawn per episode; the first one that is not solved at the start is used
 GOAL_DRAWS = 6
-
-FINGER = 0.015  # m, radius of the finger
-HOME = (0.0, 0.0, 0.12)  # m, initial position of the finger
-LOW, HIGH = np.array([-0.25, -0.25, FINGER]), np.array([0.25, 0.25, 0.25])  # m, its workspace
-STRIDE = 0.05  # m per step at full action
 
 # m, length of a heading. With a length equal to the threshold, headings up to 15 degrees of yaw
 # apart are within the threshold
@@ -58,10 +52,10 @@ class Push(Task):
             ground.
     """
 
-    actions = ("finger x", "finger y", "finger z")
+    finger = Finger((0.0, 0.0, 0.12), (-0.25, -0.25, Finger.RADIUS), (0.25, 0.25, 0.25), 0.05)
+    actions = finger.actions
     bounds = (
-        *((f"finger {a}", "m", -0.5, 0.5) for a in "xyz"),
-        *((f"finger velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
+        *finger.bounds,
         *((f"cube {a}", "m", -1.0, 1.0) for a in "xyz"),
         *((f"cube quaternion {a}", "", -1.0, 1.0) for a in "xyzw"),
         *((f"cube velocity {a}", "m/s", -20.0, 20.0) for a in "xyz"),
@@ -117,11 +111,10 @@ class Push(Task):
             material=material,
             name="block",
         )
-        finger = Drive(Sphere(FINGER), mass=0.05, force_limit=2.5, position=HOME, name="finger")
         return Scene(
             bodies=[block],
             statics=[Ground(material=material, name="ground"), *posts],
-            drives=[finger],
+            drives=[self.finger.drive()],
         )
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
@@ -179,16 +172,13 @@ class Push(Task):
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the finger by up to 5 cm along each axis, within its workspace."""
-        finger = now.position[:, 1]
-        target = np.minimum(np.maximum(finger + STRIDE * actions, LOW), HIGH)
-        world.command_drives(((target - finger) / self.frame)[:, None])
+        self.finger.act(world, now, actions, self.frame)
 
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """Position and velocity of the finger; pose and velocity of the block; the offset to it."""
-        finger, block = now.position[:, 1], now.position[:, 0]
-        out[:, 0:3], out[:, 3:6] = finger, now.linear_velocity[:, 1]
+        self.finger.observe(now, out[:, 0:6])
         out[:, 6:19] = now.kinematics[:, 0]
-        out[:, 19:22] = block - finger
+        out[:, 19:22] = now.position[:, 0] - self.finger.position(now)
 
     def achieved(self, world: World, now: Readout) -> Array:
         """Position of the block, and its heading if the goal includes a yaw."""
@@ -208,9 +198,9 @@ class Push(Task):
         if self.target_yaw:  # the goal distance may be that of the headings
             goal_distance = np.sqrt(np.sum(from_goal**2, axis=1))
         radius = 1.6 * HALF if self.block.cube else self.block.radius
-        ratio = (radius + FINGER) / np.maximum(goal_distance, 1e-6)
+        ratio = (radius + Finger.RADIUS) / np.maximum(goal_distance, 1e-6)
         behind = block + from_goal * ratio[:, None]
-        return {"reach": -distance(now.position[:, 1], behind)}
+        return {"reach": -distance(self.finger.position(now), behind)}
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
         """The goal; with `target_yaw`, also dots at the corners of a cube at the goal's yaw."""

@@ -10,9 +10,7 @@ from gymnasium.vector import AsyncVectorEnv
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from tests.rigid_envs.rollout import (
-    EPISODE,
     IDS,
-    STACK,
     assert_same,
     make,
     make_vec,
@@ -21,7 +19,7 @@ from tests.rigid_envs.rollout import (
 )
 
 WORKERS = 2
-STEPS = {env_id: 2 * EPISODE if env_id == STACK else EPISODE for env_id in IDS}
+STEPS = {env_id: gym.spec(env_id).max_episode_steps for env_id in IDS}
 
 
 def makers(env_id):

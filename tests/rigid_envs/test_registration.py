@@ -13,7 +13,7 @@ from rigid_envs.registration import register
 from rigid_envs.tasks import TASKS, Push
 from tests.rigid_envs.rollout import DENSE_IDS, IDS, PUSH, STACK, assert_same, make, make_vec
 
-STEPS = {"push": 50, "stack": 100, "throw": 50}
+STEPS = {"push": 50, "reach": 25, "slide": 50, "stack": 100, "throw": 50}
 
 
 def steps_of_an_episode(env, limit=250):
@@ -52,7 +52,7 @@ def custom_ids():
         del gym.registry[env_id]
 
 
-def test_six_ids_are_registered_and_registering_again_changes_nothing():
+def test_ids_are_registered_and_registering_again_changes_nothing():
     specs = {env_id: gym.registry[env_id] for env_id in gym.registry if env_id[:5] == "Rigid"}
     assert set(specs) == {*IDS, *DENSE_IDS}
     register()

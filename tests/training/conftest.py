@@ -13,7 +13,7 @@ if REACH not in gym.registry:
         REACH,
         entry_point=ReachEnv,
         vector_entry_point=ReachVectorEnv,
-        kwargs={"task": "reach"},
+        kwargs={"task": "test"},
     )
 
 
@@ -33,6 +33,7 @@ def quick_ppo(reach: str) -> PPOConfig:
         n_steps=10,
         n_epochs=1,
         batch_size=40,
+        eval_freq=0,
         seed=3,
         env_kwargs={"reward_type": "dense"},
         policy_kwargs={"net_arch": [8], "activation": "tanh"},
@@ -50,6 +51,7 @@ def quick_sac(reach: str) -> SACConfig:
         buffer_size=1000,
         learning_starts=80,
         train_freq=2,
+        eval_freq=0,
         seed=3,
         env_kwargs={"reward_type": "sparse"},
         policy_kwargs={"net_arch": [8], "activation": "relu"},

@@ -18,7 +18,7 @@ def demo(
     *,
     episodes: int = 1000,
     device: str = "cpu",
-    num_threads: int | None = None,
+    num_threads: int = 1,
 ) -> tuple[RunFolder, Evaluation]:
     """Trains, evaluates, writes a video and a learning curve, and prints a summary.
 

@@ -46,7 +46,7 @@ def add_training(parser: argparse.ArgumentParser) -> None:
         help="settings that replace those of the file, as in n_epochs:4 gamma:0.95",
     )
     parser.add_argument(
-        "--num-threads", type=count, help="number of torch threads (default: at most 2)"
+        "--num-threads", type=count, default=1, help="number of torch threads (default: 1)"
     )
     add_folder(parser)
     add_environment(parser)
@@ -90,6 +90,9 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, help="of what is random in the scene (default: 0)")
     parser.add_argument("--threads", type=count, help="(default: all cores)")
+    parser.add_argument(
+        "--fidelity", help="preset of the physics (default: the fidelity that suits the scene)"
+    )
     parser.add_argument("--video", type=Path, metavar="FILE", help="mp4 or GIF to write")
     parser.add_argument(
         "--size", type=count, default=480,

@@ -173,7 +173,7 @@ def scene(options: argparse.Namespace) -> int:
 
     made = scenes.run(
         options.scene, options.bodies, options.seconds, options.seed or 0, options.threads,
-        options.video, options.size,
+        options.video, options.size, options.fidelity,
     )  # fmt: skip
     return INTERRUPTED if made.interrupted else 0
 

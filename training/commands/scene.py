@@ -10,6 +10,7 @@ import numpy as np
 
 from physics.model.free_memory import check_memory
 from physics.reference.many_bodies import SCENES
+from physics.scene.fidelity import resolve
 from physics.world import World
 from training.settings.errors import UsageError
 
@@ -54,6 +55,7 @@ def run(
     threads: int | None,
     video: Path | None = None,
     size: int = SIZE,
+    preset: str | None = None,
 ) -> SceneRun:
     """Runs a scene and prints its progress; Ctrl-C ends it with what was made so far.
 
@@ -66,18 +68,21 @@ def run(
         video: the mp4 or GIF to write, with 25 frames for each simulated second, of which a GIF
             keeps every second one; none if None.
         size: width and height of a frame in pixels.
+        preset: name of the fidelity; by default the one that suits the scene.
 
     Raises:
-        UsageError: no such scene, more bodies than memory can hold, or a video that can't be
-            written.
+        UsageError: no such scene or preset, more bodies than memory can hold, or a video that
+            can't be written.
     """
     if name not in SCENES:
         raise UsageError(f"unknown scene {name!r}: choose one of {', '.join(SCENES)}")
     try:
         check_memory(bodies * _LEAST_BYTES, f"the {bodies} bodies of a scene")
         scene, fidelity = SCENES[name](bodies, seed)
+        if preset is not None:
+            fidelity = resolve(preset)
         world = World(scene, fidelity, threads=threads)
-    except MemoryError as error:
+    except (MemoryError, ValueError) as error:
         raise UsageError(str(error)) from None
     count = len(scene.bodies)
     asked = f" of the {bodies} asked for" if count != bodies else ""

@@ -88,7 +88,7 @@ def tune(
     storage: str | None = None,
     study_name: str | None = None,
     device: str = "cpu",
-    num_threads: int | None = None,
+    num_threads: int = 1,
 ) -> Tuned:
     """Trains repeatedly with settings sampled from `search_space.SPACES`.
 
@@ -148,7 +148,7 @@ def _success(
     trial: optuna.Trial,
     episodes: int,
     device: str,
-    num_threads: int | None,
+    num_threads: int,
 ) -> float:
     """Trains with the settings of a trial and returns the success rate of the policy."""
     drawn = with_drawn(config, draw(config.algo, trial))

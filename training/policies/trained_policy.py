@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from training.policies.policy import Policy
+from training.policies.policy import SCRIPTED, Policy
 from training.policies.policy_file import SUFFIX, read_policy
 from training.runs.run_folder import RunFolder
 from training.settings.config import ALGORITHMS
@@ -80,7 +80,7 @@ def trained_policy(
     """
     if algo is not None and algo not in ALGORITHMS:
         raise UsageError(f"unknown algorithm {algo!r}; did you mean {nearest(algo, ALGORITHMS)!r}?")
-    check_exists(path, f"a run folder, a {SUFFIX} file or a model.zip")
+    check_exists(path, f'a run folder, a {SUFFIX} file, a model.zip, "{SHIPPED}" or "{SCRIPTED}"')
     exported = path / f"policy{SUFFIX}"
     if exported.is_file() and not (path / "run.json").exists():  # as the folders in results/
         path = exported

@@ -8,16 +8,15 @@ than long ones, and the outcome does not depend on the number of worlds.
 import math
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import VectorEnv
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from training.policies.episodes import play_episodes
 from training.policies.policy import Policy
 from training.settings.environments import (
     effective_fidelity,
@@ -90,7 +89,7 @@ def evaluate(
         try:
             for first in range(0, episodes, worlds):
                 rounds.append(
-                    _play_round(envs, policy, seed + first, lambda n: bar.advance(task, n))
+                    play_episodes(envs, policy.act, seed + first, lambda n: bar.advance(task, n))
                 )
         finally:
             envs.close()
@@ -108,32 +107,6 @@ def evaluate(
         fidelity=effective_fidelity(policy.env_id, arguments),
         env_kwargs={**registered_arguments(policy.env_id), **arguments},
     )
-
-
-def _play_round(
-    envs: VectorEnv, policy: Policy, seed: int, advance: Callable[[int], None]
-) -> tuple[np.ndarray, ...]:
-    """Plays one episode in each world; returns the first four fields of Evaluation."""
-    success_at_end = np.zeros(envs.num_envs, dtype=bool)
-    success_at_any_time = np.zeros(envs.num_envs, dtype=bool)
-    episode_return = np.zeros(envs.num_envs)
-    length = np.zeros(envs.num_envs, dtype=int)
-    playing = np.ones(envs.num_envs, dtype=bool)
-    observation, _ = envs.reset(seed=seed)
-    while playing.any():
-        actions = policy.act(observation)
-        observation, rewards, terminated, truncated, infos = envs.step(actions)
-        ended = playing & (terminated | truncated)
-        success = np.array(infos["is_success"], dtype=bool)
-        if ended.any():  # infos["is_success"] already belongs to their next episode
-            success[ended] = infos["final_info"]["is_success"][ended]
-        episode_return[playing] += rewards[playing]
-        length[playing] += 1
-        success_at_any_time |= playing & success
-        success_at_end |= ended & success
-        playing &= ~ended
-        advance(int(ended.sum()))
-    return success_at_end, success_at_any_time, episode_return, length
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:

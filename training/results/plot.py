@@ -14,12 +14,13 @@ from training.settings.errors import UsageError
 
 STEPS = "time/total_timesteps"
 SECONDS = "time/wall_time"
-SUCCESS = "rollout/success_rate"
+EXPLORING, EVALUATED = "rollout/success_rate", "eval/success_rate"
+"""Success of training episodes, whose actions are sampled, and of the mean action."""
 POINTS = 200
 """Number of points at which several curves are averaged: more than the plot can resolve."""
 
 Curve = list[dict[str, float]]
-"""Rows of a learning curve: steps, seconds and success rate by column name."""
+"""Rows of a learning curve: steps, seconds and success rates by column name; NaN where none."""
 
 
 def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None) -> Path:
@@ -66,6 +67,9 @@ def draw_learning_curves(
 ) -> None:
     """Plots one curve, or several thin curves with their mean and a band from minimum to maximum.
 
+    The curves are those of the mean action; faint ones below them are those of training episodes.
+    Runs without evaluations have only the latter.
+
     Args:
         curves: The curves, each with at least one row.
         image: The PNG to write.
@@ -77,12 +81,15 @@ def draw_learning_curves(
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2, sharey=True)
     for axes, column, unit in ((left, SECONDS, 1.0), (right, STEPS, 1e6)):
-        lines = [
-            (np.array([row[column] for row in rows]) / unit, [100 * row[SUCCESS] for row in rows])
-            for rows in curves
-        ]
+        lines = [_line(rows, column, unit, EXPLORING) for rows in curves]
+        evaluated = [_line(rows, column, unit, EVALUATED) for rows in curves]
+        if all(len(x) > 0 for x, _ in evaluated):
+            for n, line in enumerate(lines):
+                label = "with exploration" if n == 0 else None
+                axes.plot(*line, color="gray", linewidth=0.7, alpha=0.6, label=label)
+            lines = evaluated
         if len(lines) == 1:
-            axes.plot(*lines[0])
+            axes.plot(*lines[0], label="mean action" if lines is evaluated else None)
         else:
             _draw_spread(axes, lines, labels)
         axes.grid(alpha=0.3)
@@ -91,8 +98,8 @@ def draw_learning_curves(
             axes.axhline(100 * target, color="gray", linestyle=":")
     left.set(xlabel="wall time / s", ylabel="success / %", ylim=(-2, 102))
     right.set(xlabel="environment steps / million")
-    if len(curves) > 1:  # above the plots, where it hides nothing
-        lines, names = right.get_legend_handles_labels()
+    lines, names = right.get_legend_handles_labels()
+    if names:  # above the plots, where it hides nothing
         figure.legend(
             lines, names, loc="outside upper right", ncols=min(len(names), 4), fontsize="small"
         )
@@ -102,7 +109,7 @@ def draw_learning_curves(
 
 
 def mean_and_spread(
-    lines: Sequence[tuple[Sequence[float] | np.ndarray, Sequence[float]]],
+    lines: Sequence[tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Mean, minimum and maximum of several lines over the range that all of them cover.
 
@@ -123,8 +130,15 @@ def mean_and_spread(
     return points, values.mean(axis=0), values.min(axis=0), values.max(axis=0)
 
 
+def _line(rows: Curve, column: str, unit: float, success: str) -> tuple[np.ndarray, np.ndarray]:
+    """X values and success in %, of the rows that have it."""
+    found = [(row[column] / unit, 100 * row[success]) for row in rows if row[success] >= 0.0]
+    x, y = np.array(found).reshape(-1, 2).T
+    return x, y
+
+
 def _draw_spread(
-    axes: Axes, lines: Sequence[tuple[np.ndarray, list[float]]], labels: Sequence[str]
+    axes: Axes, lines: Sequence[tuple[np.ndarray, np.ndarray]], labels: Sequence[str]
 ) -> None:
     for line, label in zip(lines, labels, strict=True):
         axes.plot(*line, linewidth=0.7, alpha=0.8, label=label)
@@ -136,7 +150,7 @@ def _draw_spread(
 
 
 def read_learning_curve(folder: RunFolder) -> Curve:
-    """The rows of progress.csv that have a success rate: steps, seconds and success rate.
+    """The rows of progress.csv that have a success rate: steps, seconds and success rates.
 
     Raises:
         UsageError: The folder holds no run, or progress.csv is missing, damaged or has no such row.
@@ -147,11 +161,11 @@ def read_learning_curve(folder: RunFolder) -> Curve:
 
 def read_curve(progress: Path) -> Curve:
     """The rows of a file that have a success rate; errors as for `read_learning_curve`."""
-    columns = (STEPS, SECONDS, SUCCESS)
+    columns = (STEPS, SECONDS, EXPLORING)
     try:
         with progress.open(encoding="utf-8", newline="") as file:
             rows = [
-                {column: float(row[column]) for column in columns}
+                {column: float(row.get(column) or "nan") for column in (*columns, EVALUATED)}
                 for row in csv.DictReader(file)
                 if all(row.get(column) for column in columns)
             ]

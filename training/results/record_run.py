@@ -24,7 +24,7 @@ MAX_FILE_BYTES = 300_000
 """Largest policy or image, because a git repository stores every version of it."""
 ROWS = 200
 """Largest number of rows of a learning curve: more than a plot can resolve."""
-COLUMNS = ("rollout/", "time/")
+COLUMNS = ("rollout/", "time/", "eval/")
 """Prefixes of the columns of a learning curve that are copied."""
 
 
@@ -207,11 +207,13 @@ def _write(result: Result, folder: RunFolder, config: TrainConfig, repository: P
 
 
 def _thin(source: Path, target: Path) -> None:
-    """Copies a learning curve with at most ROWS rows, including the first and the last."""
+    """Copies a learning curve with ROWS rows, including the first and the last, and evaluations."""
     with source.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     columns = [name for name in rows[0] if name.startswith(COLUMNS)]
-    kept = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).round().astype(int))
+    evenly = np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).round().astype(int)
+    evaluated = [n for n, row in enumerate(rows) if row.get("eval/success_rate")]
+    kept = sorted({*evenly.tolist(), *evaluated})
     with target.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()

@@ -25,7 +25,8 @@ HEAD = """\
 
 Trained policies, each evaluated on episodes that it was not trained on, with its mean action.
 `rigid-envs results` generates this page from the files in `results/`; these include the settings,
-the learning curve and the policy of each row.
+the learning curve and the policy of each row. Learning curves show the success of training
+episodes, whose actions are sampled: it is lower than that of the mean action in the tables.
 
 ```sh
 rigid-envs evaluate results/ppo/RigidEnvs-Push-v0_seed0/policy.safetensors  # measure a policy again

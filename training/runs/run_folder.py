@@ -109,6 +109,15 @@ class RunFolder:
         with lock:
             yield
 
+    @property
+    def last_start(self) -> str:
+        """When the run was started or resumed last, as run.json has it; "" if that is damaged."""
+        try:
+            run = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+            return str([run, *run.get("resumed", [])][-1]["started"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return ""
+
     def record_resumption(self, steps: int) -> None:
         """Adds the resumption to run.json: from which step, by which command, when.
 
@@ -160,7 +169,7 @@ def latest_run(log_folder: Path, algo: str | None = None, env_id: str | None = N
         UsageError: There is none.
     """
     runs = [
-        ((path / "run.json").stat().st_mtime_ns, number, path)
+        (RunFolder(path).last_start, number, path)
         for folder in log_folder.glob(algo or "*")
         for name, number, path in _runs(folder)
         if env_id is None or name == folder_name(env_id)
@@ -232,7 +241,7 @@ def _provenance() -> dict[str, Any]:
     return {
         "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
         "git_commit": git_commit(),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
     }
 
 

@@ -1,6 +1,5 @@
 """Builds the worlds and the Stable-Baselines3 model that the settings describe."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -48,20 +47,20 @@ class LinearSchedule:
 
 @contextmanager
 def worlds_and_model(
-    config: TrainConfig, device: str, num_threads: int | None
+    config: TrainConfig, device: str, num_threads: int
 ) -> Iterator[tuple[RigidVecEnv, BaseAlgorithm]]:
     """The worlds and the model of a run; afterwards closes the worlds.
 
     Args:
         config: The settings.
         device: Torch device of the networks.
-        num_threads: Number of torch threads meanwhile; by default at most 2.
+        num_threads: Number of torch threads meanwhile.
 
     Raises:
         UsageError: The environment rejects its arguments, or the device does not exist.
     """
     threads = torch.get_num_threads()
-    torch.set_num_threads(num_threads or min(2, os.cpu_count() or 1))
+    torch.set_num_threads(num_threads)
     worlds = RigidVecEnv(make_training_env(config, config.env_kwargs))
     try:
         yield worlds, _model(config, _wrapped(worlds, config), _checked_device(device))

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
+from training.sb3.evaluation import SuccessEvaluation
 from training.sb3.finetune import FineTuning
 
 SECONDS_BETWEEN_UPDATES = 0.5
@@ -83,25 +84,27 @@ class TrainingProgress(BaseCallback):
 
 
 class StopAtSuccess(BaseCallback):
-    """Ends training when the success rate over a full window of episodes reaches the target.
+    """Ends training when the success of the mean action reaches the target in an evaluation.
 
     Args:
         target: Fraction of the episodes.
+        evaluation: The evaluations.
         finetuning: The fine-tuning stage, if any. Reaching the target before this stage starts the
             stage; reaching it during the stage ends training.
     """
 
-    def __init__(self, target: float, finetuning: FineTuning | None = None):
+    def __init__(
+        self, target: float, evaluation: SuccessEvaluation, finetuning: FineTuning | None = None
+    ):
         super().__init__()
-        self.target = target
+        self.target, self.evaluation = target, evaluation
         self.finetuning = finetuning
         self.reached = False
 
     def _on_rollout_end(self) -> None:
-        episodes = self.model.ep_success_buffer
-        if episodes is None or len(episodes) < (episodes.maxlen or 0):
+        if self.evaluation.at_step != self.num_timesteps:
             return
-        reached = bool(np.mean(episodes) >= self.target)
+        reached = self.evaluation.rate >= self.target
         if self.finetuning is None or self.finetuning.started:
             self.reached = reached
         elif reached:

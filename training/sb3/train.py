@@ -20,6 +20,7 @@ from training.runs.run_folder import RunFolder, create_run_folder
 from training.sb3.bootstrap import BatchedTimeoutBootstrap
 from training.sb3.build import worlds_and_model
 from training.sb3.checkpoint import PeriodicCheckpoint, save_checkpoint
+from training.sb3.evaluation import SuccessEvaluation
 from training.sb3.finetune import FineTuning
 from training.sb3.learning_curve import continued_logger
 from training.sb3.model_state import read_state, restore
@@ -27,7 +28,7 @@ from training.sb3.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.sb3.rollout_threads import OneThreadRollouts
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.config import PPOConfig, SACConfig, TrainConfig
-from training.settings.environments import make_training_env
+from training.settings.environments import make_training_env, make_vector_env
 from training.settings.errors import UsageError
 
 
@@ -77,7 +78,7 @@ def train(
     log_folder: Path = Path("runs"),
     *,
     device: str = "cpu",
-    num_threads: int | None = None,
+    num_threads: int = 1,
     save_every: int | None = None,
     quiet: bool = False,
     callbacks: Sequence[BaseCallback] = (),
@@ -88,8 +89,8 @@ def train(
         config: The settings.
         log_folder: Folder for run folders.
         device: Torch device of the networks.
-        num_threads: Number of torch threads; by default at most 2, because small networks do not
-            gain from more.
+        num_threads: Number of torch threads. More of them gain little with small networks, take
+            many times as long if another program uses their cores, and round differently.
         save_every: Steps between checkpoints; by default a tenth of the run.
         quiet: Show no progress.
         callbacks: Additional callbacks, called last in every step.
@@ -121,7 +122,7 @@ def resume(
     folder: RunFolder,
     *,
     device: str = "cpu",
-    num_threads: int | None = None,
+    num_threads: int = 1,
     save_every: int | None = None,
     quiet: bool = False,
 ) -> TrainResult:
@@ -248,8 +249,16 @@ def _callbacks(config: TrainConfig, worlds: RigidVecEnv) -> list[BaseCallback]:
             config.seed + config.n_envs,
         )
         callbacks.append(finetuning)
-    if config.target_success_rate is not None:
-        callbacks.append(StopAtSuccess(config.target_success_rate, finetuning))
+    if config.evaluation_interval:
+        evaluation = SuccessEvaluation(
+            partial(
+                make_vector_env, config.env_id, config.n_eval_episodes, **config.final_env_kwargs
+            ),
+            config.evaluation_interval,
+        )
+        callbacks.append(evaluation)
+        if config.target_success_rate is not None:
+            callbacks.append(StopAtSuccess(config.target_success_rate, evaluation, finetuning))
     return callbacks
 
 

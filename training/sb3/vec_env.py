@@ -33,13 +33,22 @@ class RigidVecEnv(VecEnv):
         envs: Vector environment with autoreset mode SAME_STEP; `close` closes it.
 
     Raises:
+        TypeError: It is not a vector environment.
         ValueError: The vector environment has another autoreset mode.
     """
 
     def __init__(self, envs: VectorEnv):
+        if not isinstance(envs, VectorEnv):
+            raise TypeError(
+                f"envs must be a vector environment, from gym.make_vec, got {envs}; "
+                "Stable-Baselines3 takes a single environment as it is"
+            )
         mode = envs.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
-            raise ValueError(f"autoreset_mode is {mode}, should be {AutoresetMode.SAME_STEP}")
+            raise ValueError(
+                f"autoreset_mode is {mode}, should be {AutoresetMode.SAME_STEP}: "
+                'gym.make_vec(..., autoreset_mode="SameStep")'
+            )
         self.envs = envs
         self.seconds_in_envs = 0.0
         """Wall time spent inside the vector environment's steps so far, in seconds."""

@@ -9,6 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from training.scripted.push import push
+from training.scripted.reach import reach
+from training.scripted.slide import slide
 from training.scripted.stack import stack
 from training.scripted.throw import throw
 from training.settings.environments import task_of
@@ -19,7 +21,13 @@ Array = np.ndarray
 Controller = Callable[[dict[str, Array]], Array]
 """Takes observations `{key: [n, k]}` and returns actions [n, action_dim] within ±1."""
 
-CONTROLLERS: dict[str, Controller] = {"push": push, "stack": stack, "throw": throw}
+CONTROLLERS: dict[str, Controller] = {
+    "push": push,
+    "reach": reach,
+    "slide": slide,
+    "stack": stack,
+    "throw": throw,
+}
 """Controllers by task: all environment ids of a task have the same one."""
 
 

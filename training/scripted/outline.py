@@ -7,7 +7,8 @@ import numpy as np
 
 from physics import Part
 from rigid_envs.tasks.block import Block
-from rigid_envs.tasks.push import FINGER, STRIDE
+from rigid_envs.tasks.finger import Finger
+from rigid_envs.tasks.push import Push
 
 Array = np.ndarray
 
@@ -51,9 +52,9 @@ def outline(block: Block) -> Outline:
 
     angles = 2.0 * np.pi / _DIRECTIONS * np.arange(_DIRECTIONS)
     ways = np.stack([np.cos(angles), np.sin(angles), np.zeros(_DIRECTIONS)], axis=1)
-    reach = np.full(_DIRECTIONS, block.radius + FINGER)
+    reach = np.full(_DIRECTIONS, block.radius + Finger.RADIUS)
     for _ in range(_STEPS):  # sphere tracing: each step is as long as the free distance
-        reach -= np.maximum(distance(reach[:, None] * ways) - FINGER, 0.0)
+        reach -= np.maximum(distance(reach[:, None] * ways) - Finger.RADIUS, 0.0)
     at, step = reach[:, None] * ways, 1e-5 * np.eye(3)[:2]
     normal = np.stack([distance(at + s) - distance(at - s) for s in step], axis=1)
     alignment = np.sum(normal * ways[:, :2], axis=1) / np.sqrt(np.sum(normal**2, axis=1))
@@ -80,7 +81,7 @@ def push_by_outline(
     """
     from_block = finger[:, :2] - block[:, :2]
     far = np.sqrt(np.sum(from_block**2, axis=1))
-    level = max(shape.height, FINGER + 0.002)
+    level = max(shape.height, Finger.RADIUS + 0.002)
     low = finger[:, 2] < level + 0.012
 
     places = shape.angles + yaw[:, None]
@@ -99,13 +100,13 @@ def push_by_outline(
     place = block[:, :2] - (reach + _GAP)[:, None] * way
     over = np.sqrt(np.sum((finger[:, :2] - place) ** 2, axis=1)) < _ASIDE
 
-    target, travel = np.empty_like(finger), shape.top + FINGER + 0.012
+    target, travel = np.empty_like(finger), shape.top + Finger.RADIUS + 0.012
     target[:, :2], target[:, 2] = place, travel
     rising = ~behind & (finger[:, 2] < travel - 0.01)
     target[rising, :2] = finger[rising, :2]
     target[over & ~low, 2] = level
     pushing = behind & low
-    stride = np.clip(0.6 * distance, 0.004, 0.5 * STRIDE)[:, None]
+    stride = np.clip(0.6 * distance, 0.004, 0.5 * Push.finger.stride)[:, None]
     steered = finger[:, :2] + stride * way - 0.8 * aside
     target[pushing, :2], target[pushing, 2] = steered[pushing], level
     solved = distance < _DONE

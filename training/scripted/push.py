@@ -5,15 +5,16 @@ import numpy as np
 from physics import Compound
 from physics.rotation import yaw as yaw_of
 from rigid_envs.tasks.block import HALF, Block
-from rigid_envs.tasks.push import FINGER, POST_RADIUS, POSTS, STRIDE
+from rigid_envs.tasks.finger import Finger
+from rigid_envs.tasks.push import POST_RADIUS, POSTS, Push
 from training.scripted.outline import outline, push_by_outline
 
 Array = np.ndarray
 
 # m, height of the finger above the ground at which it moves over the cube without contact
-_TRAVEL = 2.0 * HALF + FINGER + 0.02
+_TRAVEL = 2.0 * HALF + Finger.RADIUS + 0.02
 # m, distance of the finger from the cube's centre at which a push starts; m, tolerance sideways
-_BEHIND, _ASIDE = 1.5 * HALF + FINGER + 0.005, 0.012
+_BEHIND, _ASIDE = 1.5 * HALF + Finger.RADIUS + 0.005, 0.012
 # m, distance from the goal at which the finger stops pushing
 _DONE = 0.02
 # m, least distance between the centres of cube and post; m, look-ahead for posts
@@ -62,7 +63,7 @@ def push(
         )
     else:
         target = _push_straight(finger, cube, direction, distance)
-    return np.clip((target - finger) / STRIDE, -1.0, 1.0)
+    return np.clip((target - finger) / Push.finger.stride, -1.0, 1.0)
 
 
 def _push_straight(finger: Array, cube: Array, direction: Array, distance: Array) -> Array:
@@ -73,7 +74,7 @@ def _push_straight(finger: Array, cube: Array, direction: Array, distance: Array
     off = np.sqrt(np.sum(aside**2, axis=1))
 
     low = finger[:, 2] < HALF + 0.02
-    behind = (along < -0.8 * (HALF + FINGER)) & (off < 2.0 * _ASIDE)
+    behind = (along < -0.8 * (HALF + Finger.RADIUS)) & (off < 2.0 * _ASIDE)
     place = cube[:, :2] - _BEHIND * direction
     over = np.sqrt(np.sum((finger[:, :2] - place) ** 2, axis=1)) < _ASIDE
 
@@ -100,7 +101,10 @@ def _avoid_posts(
 
     `size`: width of the block relative to the cube.
     """
-    room, beyond = POST_RADIUS + size * (_ROOM - POST_RADIUS), size * (_BEHIND - FINGER) + FINGER
+    room, beyond = (
+        POST_RADIUS + size * (_ROOM - POST_RADIUS),
+        size * (_BEHIND - Finger.RADIUS) + Finger.RADIUS,
+    )
     turns = np.pi / 24.0 * np.arange(-24, 24)
     turned = np.stack([np.cos(turns), np.sin(turns)], axis=1)  # [turns, 2]
     across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
@@ -120,7 +124,7 @@ def _avoid_posts(
 
 def _finger_fits(places: Array, post: Array) -> Array:
     """Whether a finger at positions [..., 2] m does not touch a post."""
-    return np.sqrt(np.sum((places - post) ** 2, axis=-1)) > POST_RADIUS + FINGER + 0.002
+    return np.sqrt(np.sum((places - post) ** 2, axis=-1)) > POST_RADIUS + Finger.RADIUS + 0.002
 
 
 def _push_by_faces(
@@ -145,7 +149,7 @@ def _push_by_faces(
     from_cube = (finger - cube)[:, None, :2]
     x, y = np.sum(from_cube * normals, axis=2), np.sum(from_cube * tangents, axis=2)
     low = finger[:, 2] < HALF + 0.02
-    behind = (x < -0.8 * (HALF + FINGER)) & (np.abs(y) < HALF + 0.004) & low[:, None]
+    behind = (x < -0.8 * (HALF + Finger.RADIUS)) & (np.abs(y) < HALF + 0.004) & low[:, None]
     score = np.sum(normals * direction[:, None], axis=2) + 0.25 * behind
     for post in posts:
         score -= 2.0 * ~_finger_fits(cube[:, None, :2] - _BEHIND * normals, post)

@@ -83,9 +83,14 @@ class TrainConfig:
     fidelity. The policy is evaluated with them."""
     normalize: bool = setting(boolean, False)
     """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
+    eval_freq: int | None = setting(optional(integer(0)), None)
+    """Environment steps between two evaluations of the policy's mean action, on episodes with the
+    arguments of the end of training. null: 100 for each of its episodes; 0: none."""
+    n_eval_episodes: int = setting(integer(1), 1000)
+    """Episodes of each of these evaluations."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
-    """Stop early when this fraction of the last 1,000 (or n_envs, if more) episodes succeeds. With
-    a fine-tuning stage: start that stage early, and stop when the rate is reached in it too."""
+    """Stop early when this fraction of the episodes of an evaluation succeeds. With a fine-tuning
+    stage: start that stage early, and stop when the rate is reached in it too."""
     seed: int | None = setting(optional(integer(0)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
@@ -141,6 +146,11 @@ class TrainConfig:
         """Arguments of the environment at the end of training."""
         return {**self.env_kwargs, **self.finetune_env_kwargs}
 
+    @property
+    def evaluation_interval(self) -> int:
+        """Environment steps between two evaluations during training; 0: none."""
+        return 100 * self.n_eval_episodes if self.eval_freq is None else self.eval_freq
+
     def as_mapping(self) -> dict[str, Any]:
         """The settings by name, as in a file."""
         values = dataclasses.asdict(self)
@@ -157,6 +167,11 @@ class TrainConfig:
         Args:
             where: Start of the error message.
         """
+        if self.target_success_rate is not None and self.eval_freq == 0:
+            raise UsageError(
+                f"{where}: target_success_rate is {self.target_success_rate}, but eval_freq is 0: "
+                "only an evaluation can reach it"
+            )
         if bool(self.finetune_timesteps) != bool(self.finetune_env_kwargs):
             raise UsageError(
                 f"{where}: finetune_timesteps is {self.finetune_timesteps} and "

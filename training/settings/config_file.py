@@ -53,7 +53,8 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
         raise UsageError(
             f"{source}: no settings for environment {env_id!r}; "
             f"did you mean {nearest(env_id, names)!r}? It has {', '.join(names)}; "
-            "to use your own settings: --config FILE"
+            + ("HER needs the sparse reward; " if algo == "sac" and "Dense" in env_id else "")
+            + "to use your own settings: --config FILE"
         )
     settings = entries[key]
     if not isinstance(settings, dict):

@@ -352,6 +352,12 @@ def test_bad_ranges_are_named_at_construction_and_at_reset(ranges, error, messag
         np.testing.assert_array_equal(before[name], after[name])
 
 
+def test_a_task_without_bodies_draws_only_noise():
+    Runner("reach", 1, randomize={"noise": (0.0, 0.1)})
+    with pytest.raises(ValueError, match=r"randomize\['mass'\]: this task has no bodies, got 2"):
+        Runner("reach", 1, randomize={"noise": 0.1, "mass": 2.0})
+
+
 def test_a_task_for_one_size_accepts_no_other():
     class OneSize(Push):
         size_range = None

@@ -20,7 +20,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.cameras import following
 from rigid_envs.rendering.renderer import grid
 from rigid_envs.rendering.view import BODY_COLORS, Mark
-from rigid_envs.tasks import Push, Stack, Throw, push
+from rigid_envs.tasks import Push, Reach, Slide, Stack, Throw
 from tests.rigid_envs.rollout import (
     IDS,
     PUSH,
@@ -181,7 +181,9 @@ def test_one_world_and_many_draw_alike(env_id, option):
 # --- what there is to see ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("task", [Push(), Stack(5), Throw()], ids=lambda t: type(t).__name__)
+@pytest.mark.parametrize(
+    "task", [Push(), Reach(), Slide(), Stack(5), Throw()], ids=lambda t: type(t).__name__
+)
 def test_the_camera_sees_the_whole_task(task):
     world = World(task.scene())
     draws = np.random.default_rng(0).random((1, 200, task.draw_count))[0]
@@ -202,11 +204,13 @@ def test_the_camera_sees_the_whole_task(task):
     ("task", "low", "high"),
     [
         # as high as where it starts; a picture of all that it can reach would be mostly floor
-        (Push(), push.LOW, (*push.HIGH[:2], push.HOME[2])),
+        (Push(), Push.finger.low, (*Push.finger.high[:2], Push.finger.home[2])),
+        (Reach(), Reach.finger.low, Reach.finger.high),
+        (Slide(), Slide.finger.low, (*Slide.finger.high[:2], Slide.finger.home[2])),
         (Stack(), Stack.hand.low, Stack.hand.high),
         (Throw(), Throw.hand.low, Throw.hand.high),
     ],
-    ids=["Push", "Stack", "Throw"],
+    ids=["Push", "Reach", "Slide", "Stack", "Throw"],
 )
 def test_the_camera_sees_the_tool_wherever_it_goes(task, low, high):
     places = np.array(list(itertools.product(*zip(low, high, strict=True))))

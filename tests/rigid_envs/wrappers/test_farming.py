@@ -83,7 +83,7 @@ def always(*action: float) -> Policy:
 
 def toward(observation: dict[str, Array], place: Array) -> Array:
     """Actions of Push that bring the finger to a place [n, 3]."""
-    return np.clip((place - observation["observation"][:, :3]) / push.STRIDE, -1.0, 1.0)
+    return np.clip((place - observation["observation"][:, :3]) / push.Push.finger.stride, -1.0, 1.0)
 
 
 def hover_above(observation: dict[str, Array], step: int) -> Array:

@@ -67,7 +67,7 @@ def test_record_and_plot_write_into_the_run_folder(trained, tmp_path, capsys):
 
 
 def test_scripted_prints_its_table(reach, monkeypatch, capsys):
-    monkeypatch.setitem(CONTROLLERS, "reach", straight_to_the_goal)
+    monkeypatch.setitem(CONTROLLERS, "test", straight_to_the_goal)
     assert cli.main(["scripted", "--env", reach, "-n", "10"]) == 0
     assert "100.0%" in capsys.readouterr().out
 

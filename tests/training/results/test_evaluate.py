@@ -118,7 +118,7 @@ def test_output_shows_success_interval_and_how_the_episodes_were_played(solver, 
 
 
 def test_scripted_policy_is_that_of_the_task(reach, monkeypatch):
-    monkeypatch.setitem(CONTROLLERS, "reach", straight_to_the_goal)
+    monkeypatch.setitem(CONTROLLERS, "test", straight_to_the_goal)
     assert evaluate(scripted_policy(reach), 5, quiet=True).success_at_end.all()
     with pytest.raises(UsageError, match="unknown environment 'Test/Reech-v0'"):
         scripted_policy("Test/Reech-v0")

@@ -82,8 +82,8 @@ def test_commit_is_marked_dirty_after_changes(tmp_path, monkeypatch):
 def test_latest_run_is_the_one_that_was_started_or_resumed_last(tmp_path, quick_ppo):
     other = replace(quick_ppo, env_id="Test/Other-v0")
     runs = [create_run_folder(tmp_path, config) for config in (quick_ppo, quick_ppo, other)]
-    for age, run in enumerate(reversed(runs)):
-        os.utime(run.path / "run.json", ns=(0, 10**18 - age))
+    for run in runs:  # a copy has other times of its files
+        os.utime(run.path / "run.json", ns=(0, 10**18 - int(run.path.name[-1])))
     assert latest_run(tmp_path) == runs[2]
     assert latest_run(tmp_path, "ppo") == runs[2]
     assert latest_run(tmp_path, "ppo", "Test/Reach-v0") == runs[1]

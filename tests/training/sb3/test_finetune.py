@@ -1,11 +1,13 @@
 """The fine-tuning stage: other arguments of the environment in the last part of a run."""
 
+import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
+from training.policies.episodes import Episodes
 from training.policies.policy_file import read_policy
 from training.policies.trained_policy import trained_policy
-from training.sb3 import build
+from training.sb3 import build, evaluation
 from training.sb3 import train as train_module
 from training.sb3.train import resume, train
 from training.settings.errors import UsageError
@@ -57,18 +59,20 @@ def test_her_supports_the_change(quick_sac, tmp_path, made):
 
 
 def test_success_before_fine_tuning_starts_it_early(quick_ppo, tmp_path, made, monkeypatch):
-    monkeypatch.setattr(build, "SUCCESS_WINDOW", 8)
+    every = Episodes(*np.ones((4, 10), dtype=bool))
+    monkeypatch.setattr(evaluation, "play_episodes", lambda *_: every)
     config = quick_ppo.replace(
         n_timesteps=1600,
-        target_success_rate=1e-9,
+        target_success_rate=1.0,
+        eval_freq=80,
         finetune_timesteps=160,
         finetune_env_kwargs=FINER,
         env_kwargs={"reward_type": "dense", "terminate_on_success": True},
     )
     result = train(config, tmp_path, quiet=True)
-    first = made.count("balanced")
-    assert 0 < made.index("accurate") == first < 100  # of 180 steps until the stage starts anyway
-    assert result.steps < 1440
+    # a rollout, the evaluation, and the stage; in it another rollout and evaluation
+    assert made == ["balanced"] * 10 + ["accurate"] * 11
+    assert result.steps == 168
 
 
 class InterruptAfter(BaseCallback):

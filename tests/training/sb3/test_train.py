@@ -9,10 +9,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from training.policies.trained_policy import trained_policy
 from training.results.plot import plot_learning_curves, read_learning_curve
 from training.runs.run_folder import LOCK
-from training.sb3 import build
 from training.sb3 import train as train_module
 from training.sb3.build import LinearSchedule
-from training.sb3.progress import StopAtSuccess
 from training.sb3.train import train
 from training.settings.errors import UsageError
 
@@ -94,28 +92,6 @@ def test_checkpoints_are_saved_during_training(quick_ppo, tmp_path, monkeypatch)
     with pytest.raises(RuntimeError, match="power cut"):
         train(quick_ppo, tmp_path, save_every=80, quiet=True)
     assert trained_policy(tmp_path / "ppo" / "Test-Reach-v0_1")
-
-
-def test_training_stops_when_a_full_window_of_episodes_succeeds(quick_ppo, tmp_path, monkeypatch):
-    monkeypatch.setattr(build, "SUCCESS_WINDOW", 8)
-    # so low a target is reached by the first success
-    config = quick_ppo.replace(n_timesteps=100_000, target_success_rate=0.01, seed=0)
-    result = train(config, tmp_path, quiet=True)
-    assert result.steps < 100_000
-    assert result.success_rate >= 0.01
-
-
-def test_incomplete_window_does_not_stop_training():
-    from collections import deque
-    from types import SimpleNamespace
-
-    stop = StopAtSuccess(0.9)
-    stop.model = SimpleNamespace(ep_success_buffer=deque([True] * 999, maxlen=1000))
-    stop._on_rollout_end()
-    assert stop._on_step()
-    stop.model.ep_success_buffer.append(True)
-    stop._on_rollout_end()
-    assert not stop._on_step()
 
 
 def test_linear_schedule_falls_to_zero():

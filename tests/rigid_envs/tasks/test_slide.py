@@ -1,0 +1,101 @@
+"""Slide is a fair task: goals are out of reach, and its physics allows it to be solved."""
+
+import numpy as np
+import pytest
+
+from rigid_envs.tasks.slide import (
+    FRICTION,
+    GRAVITY,
+    MAX_GOAL_ANGLE,
+    MAX_GOAL_DISTANCE,
+    MIN_GOAL_DISTANCE,
+    START,
+    THRESHOLD,
+    Slide,
+)
+from tests.rigid_envs.rollout import EPISODE, SLIDE, make_vec, random_actions, steps_of
+from training.scripted import controller_for
+
+
+def test_goals_are_out_of_reach_and_none_is_solved_at_the_start():
+    observation, info = make_vec(5000, SLIDE).reset(seed=0)
+    assert not info["is_success"].any()
+    goal = observation["desired_goal"].astype(float)
+    far = np.hypot(goal[:, 0], goal[:, 1])
+    assert MIN_GOAL_DISTANCE - 1e-6 <= far.min() < MIN_GOAL_DISTANCE + 0.01
+    assert MAX_GOAL_DISTANCE - 0.01 < far.max() <= MAX_GOAL_DISTANCE + 1e-6
+    assert np.abs(np.arctan2(goal[:, 1], goal[:, 0])).max() <= MAX_GOAL_ANGLE + 1e-6
+    # a puck that the finger touches is within 4 cm of it
+    assert goal[:, 0].min() > Slide.finger.high[0] + 0.04 + THRESHOLD
+    puck = observation["achieved_goal"].astype(float)
+    assert START - 0.001 < np.abs(puck[:, :2]).max() <= START + 1e-6
+    # as many in the outer half of the area as in the inner one
+    middle = np.sqrt(0.5 * (MIN_GOAL_DISTANCE**2 + MAX_GOAL_DISTANCE**2))
+    assert abs((far > middle).mean() - 0.5) < 0.03
+
+
+def test_the_finger_does_not_touch_the_largest_puck_at_the_start():
+    envs = make_vec(500, SLIDE, randomize={"size": Slide.size_range[1:] * 2})
+    first, _ = envs.reset(seed=0)
+    for observation, *_ in steps_of(envs, np.zeros((10, 500, 3))):
+        moved = observation["achieved_goal"] - first["achieved_goal"]
+        assert np.abs(moved).max() < 1e-3
+
+
+@pytest.mark.parametrize("friction", [FRICTION, 4.0 * FRICTION])
+def test_a_puck_stops_where_friction_lets_it_and_aim_tells_where(friction):
+    """Coulomb's law: v^2 / (2 mu g). Aim knows the friction of each world."""
+    options = {} if friction == FRICTION else {"randomize": {"friction": (friction, friction)}}
+    envs = make_vec(16, SLIDE, reward_type="dense", max_episode_steps=-1, **options)
+    envs.reset(seed=3)
+    world, angle = envs._runner.world, np.linspace(-0.4, 0.4, 16)
+    speed = np.linspace(0.6, 1.2, 16)
+    velocity = speed[:, None] * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    world.set_state(linear_velocity=velocity[:, None])
+    start, aims = world.position[:, 0].copy(), []
+    for _ in range(60):
+        observation, *_, info = envs.step(np.zeros((16, 3)))
+        aims.append(info["aim"])
+    far = np.linalg.norm(observation["achieved_goal"] - start, axis=1)
+    mu = np.sqrt(FRICTION * friction)  # the ground keeps its own
+    np.testing.assert_allclose(far, speed**2 / (2.0 * mu * GRAVITY), rtol=3e-3)
+    stopped = -np.linalg.norm(observation["achieved_goal"] - observation["desired_goal"], axis=1)
+    np.testing.assert_allclose(aims, np.tile(stopped, (60, 1)), atol=2e-3)
+
+
+def test_reach_counts_until_the_puck_has_left_the_workspace():
+    envs = make_vec(4, SLIDE, reward_type="dense")
+    envs.reset(seed=0)
+    world = envs._runner.world
+    place = world.position.copy()
+    place[:2, 0, 0] = Slide.finger.high[0] + 0.1
+    world.set_state(position=place)
+    info = envs.step(np.zeros((4, 3)))[-1]
+    assert (info["reach"] == 0.0).tolist() == [True, True, False, False]
+
+
+def test_blind_steps_stay_physical():
+    envs = make_vec(512, SLIDE)
+    envs.reset(seed=0)
+    world = envs._runner.world
+    for observation, *_, info in steps_of(envs, random_actions(200, 512)):
+        inside = ~info["out_of_bounds"]
+        assert all(np.isfinite(values).all() for values in observation.values())
+        assert world.position[inside][..., 2].min() > 0.0
+
+
+def test_a_random_policy_hardly_ever_solves_it():
+    envs = make_vec(500, SLIDE)
+    envs.reset(seed=0)
+    solved = np.zeros(500, dtype=bool)
+    for *_, info in steps_of(envs, np.random.default_rng(0).uniform(-1, 1, (EPISODE - 1, 500, 3))):
+        solved |= info["is_success"]
+    assert solved.mean() < 0.02
+
+
+def test_the_controller_solves_nearly_all_episodes():
+    envs = make_vec(500, SLIDE)
+    observation, info = envs.reset(seed=1)
+    for _ in range(EPISODE - 1):
+        observation, *_, info = envs.step(controller_for(SLIDE)(observation))
+    assert info["is_success"].mean() >= 0.95

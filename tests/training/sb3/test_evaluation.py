@@ -1,0 +1,86 @@
+"""Evaluations of the mean action during training, and what they end."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from training.policies.episodes import play_episodes
+from training.policies.trained_policy import trained_policy
+from training.results.plot import EVALUATED, draw_learning_curves, read_learning_curve
+from training.sb3.evaluation import FIRST_SEED
+from training.sb3.train import resume, train
+from training.settings.environments import make_vector_env
+from training.settings.errors import UsageError
+
+
+def weights(folder):
+    return (folder.policy).read_bytes()
+
+
+def test_every_evaluation_is_that_of_the_mean_action_and_in_the_learning_curve(quick_ppo, tmp_path):
+    config = quick_ppo.replace(eval_freq=80, n_eval_episodes=50, normalize=True)
+    folder = train(config, tmp_path, quiet=True).folder
+    with folder.progress.open() as file:
+        rows = [row["eval/success_rate"] for row in csv.DictReader(file)]
+    assert len(rows) == 2
+    envs = make_vector_env(config.env_id, 50, **config.env_kwargs)
+    act = trained_policy(folder.path).act  # after one more update: that of the last rollout
+    assert 0.0 <= float(rows[1]) <= 1.0
+    assert play_episodes(envs, act, FIRST_SEED).length.max() == 10
+    curve = read_learning_curve(folder)
+    assert [row[EVALUATED] for row in curve] == [float(row) for row in rows]
+    draw_learning_curves([curve], tmp_path / "curve.png", title="one", labels=["seed 3"])
+    draw_learning_curves([curve] * 2, tmp_path / "curves.png", title="two", labels=["a", "b"])
+
+
+@pytest.mark.parametrize("quick", ["quick_ppo", "quick_sac"])
+def test_evaluations_change_no_bit_of_the_training(quick, request, tmp_path):
+    config = request.getfixturevalue(quick)
+    plain = train(config, tmp_path, quiet=True).folder
+    often = train(config.replace(eval_freq=16, n_eval_episodes=20), tmp_path, quiet=True).folder
+    for one, other in zip(*(trained_policy(f.path).act.__self__.layers for f in (plain, often)),
+                          strict=True):  # fmt: skip
+        np.testing.assert_array_equal(one[0], other[0])
+
+
+def test_by_default_training_takes_a_hundred_steps_for_each_episode_and_zero_means_none(quick_ppo):
+    assert quick_ppo.replace(eval_freq=None, n_eval_episodes=50).evaluation_interval == 5000
+    assert quick_ppo.evaluation_interval == 0
+    with pytest.raises(UsageError, match=r"target_success_rate is 0\.9, but eval_freq is 0"):
+        quick_ppo.replace(target_success_rate=0.9)
+
+
+def test_training_ends_when_an_evaluation_reaches_the_target(quick_ppo, tmp_path):
+    # so low a target is reached by the first success
+    config = quick_ppo.replace(
+        n_timesteps=100_000, target_success_rate=0.01, eval_freq=80, n_eval_episodes=100
+    )
+    result = train(config, tmp_path, quiet=True)
+    assert result.steps < 100_000
+    reached = [row[EVALUATED] for row in read_learning_curve(result.folder)]
+    assert reached[-1] >= 0.01
+    assert max(reached[:-1], default=0.0) < 0.01
+
+
+def test_a_resumed_run_evaluates_other_episodes_than_before(quick_ppo, tmp_path, monkeypatch):
+    from training.sb3 import evaluation
+
+    seeds = []
+
+    def play(envs, act, seed):
+        seeds.append(seed)
+        return play_episodes(envs, act, seed)
+
+    monkeypatch.setattr(evaluation, "play_episodes", play)
+    config = quick_ppo.replace(n_timesteps=320, eval_freq=80, n_eval_episodes=10)
+
+    class Interrupt(evaluation.BaseCallback):
+        def _on_step(self):
+            if self.num_timesteps > 170:
+                raise KeyboardInterrupt
+            return True
+
+    folder = train(config, tmp_path, quiet=True, callbacks=[Interrupt()]).folder
+    resume(folder, quiet=True)
+    assert seeds == [FIRST_SEED + 10 * k for k in (1, 2, 3, 4)]
