@@ -181,6 +181,8 @@ def _first_stage(result: Result, settings: TrainConfig) -> str:
     changed = {k: v for k, v in settings.env_kwargs.items() if v != result.arguments.get(k)}
     if not changed:
         return ""
+    if not settings.finetune_timesteps:
+        return f" Trained with {_arguments(changed)}."
     return (
         f" Trained with {_arguments(changed)} until the fine-tuning stage, the last "
         f"{settings.finetune_timesteps:,} steps."

@@ -244,7 +244,7 @@ def _callbacks(config: TrainConfig, worlds: RigidVecEnv) -> list[BaseCallback]:
         assert config.seed is not None
         finetuning = FineTuning(
             worlds,
-            partial(make_training_env, config, config.final_env_kwargs),
+            partial(make_training_env, config, config.last_stage_kwargs),
             config.n_timesteps - config.finetune_timesteps,
             config.seed + config.n_envs,
         )
@@ -279,7 +279,7 @@ def _check_finetuning(config: TrainConfig, worlds: RigidVecEnv) -> None:
     """Raises UsageError if the environment of the fine-tuning stage cannot be used."""
     if not config.finetune_timesteps:
         return
-    envs = make_training_env(config, config.final_env_kwargs)
+    envs = make_training_env(config, config.last_stage_kwargs)
     try:
         worlds.check_compatible(envs)
         _check_her(config, envs)

@@ -83,9 +83,11 @@ class TrainConfig:
     fidelity. The policy is evaluated with them."""
     normalize: bool = setting(boolean, False)
     """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
+    eval_env_kwargs: dict[str, Any] = setting(mapping(), {})
+    """Arguments that replace those of training when the policy is evaluated, such as the length of
+    episodes."""
     eval_freq: int | None = setting(optional(integer(0)), None)
-    """Environment steps between two evaluations of the policy's mean action, on episodes with the
-    arguments of the end of training. null: 100 for each of its episodes; 0: none."""
+    """Environment steps between two evaluations of the policy's mean action. null: 100 for each of its episodes; 0: none."""
     n_eval_episodes: int = setting(integer(1), 1000)
     """Episodes of each of these evaluations."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
@@ -142,9 +144,14 @@ class TrainConfig:
         return self.from_mapping(self.env_id, {**self.as_mapping(), **values}, source)
 
     @property
-    def final_env_kwargs(self) -> dict[str, Any]:
+    def last_stage_kwargs(self) -> dict[str, Any]:
         """Arguments of the environment at the end of training."""
         return {**self.env_kwargs, **self.finetune_env_kwargs}
+
+    @property
+    def final_env_kwargs(self) -> dict[str, Any]:
+        """Arguments of the environment that the policy is for, and is evaluated with."""
+        return {**self.last_stage_kwargs, **self.eval_env_kwargs}
 
     @property
     def evaluation_interval(self) -> int:
