@@ -87,7 +87,8 @@ class TrainConfig:
     """Arguments that replace those of training when the policy is evaluated, such as the length of
     episodes."""
     eval_freq: int | None = setting(optional(integer(0)), None)
-    """Environment steps between two evaluations of the policy's mean action. null: 100 for each of its episodes; 0: none."""
+    """Environment steps between two evaluations of the policy's mean action. null: 100 for each of
+    its episodes; 0: none."""
     n_eval_episodes: int = setting(integer(1), 1000)
     """Episodes of each of these evaluations."""
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
