@@ -1,4 +1,4 @@
-"""Pictures of the tasks: frames of an episode in a row, and an animation of all three tasks.
+"""Pictures of the tasks: frames of an episode in a row, and an animation of three tasks.
 
 Trained policies of results/ play; the tower of three is built by the scripted controller.
 """
@@ -40,6 +40,8 @@ class Strip(NamedTuple):
 
 STRIPS = {
     "push": Strip("Push", 1_000_000, (0, 5, 12), {}),
+    "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),
+    "slide": Strip("Slide", 1_000_000, (0, 5, 12, 30), {}),
     "stack": Strip("Stack", 1_000_000, (0, 14, 60, 140), {"blocks": 3}),
     "throw": Strip("Throw", 1_000_000, (2, 6, 10, 14), {}),
 }

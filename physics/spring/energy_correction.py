@@ -88,7 +88,8 @@ def make_energy_correction(features):
                 due = _square(radius - start) - _square(radius - end)
                 excess = _square(d + along) - _square(d - along) - due
                 square = sx * sx + sy * sy + sz * sz
-                acts = (d > 0.0) & (excess > 0.0) & (weight > 0.0)
+                # round-off can leave an excess where nothing moves, as in a hand that holds a ball
+                acts = (d > 0.0) & (excess > 0.0) & (square > 0.0) & (weight > 0.0)
                 if compound:
                     acts &= max(wx, max(wy, wz)) < math.inf  # hidden by another part
                 rotational = rotational_inverse_mass(

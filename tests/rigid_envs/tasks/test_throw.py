@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from physics import PRESETS as FIDELITIES
+from rigid_envs import Runner
 from rigid_envs.tasks.throw import (
     GRAVITY,
     MAX_TARGET_ANGLE,
@@ -105,6 +106,17 @@ def test_blind_steps_stay_physical(fidelity, stress):
         # a hand reaches 4 m/s, and squeezes a ball out at no more than as much again
         assert world.kinetic_energy()[inside].max() < 0.5 * 0.05 * 8.0**2
         assert world.position[inside][..., 2].min() > 0.0
+
+
+def test_a_ball_that_is_held_without_any_motion_in_the_hand_stays_finite():
+    """Its velocity relative to the fingers is exactly zero, and round-off is all that is left."""
+    ball = {"mass": 4.7102496147336135, "friction": 6.8884214787092475,
+            "restitution": 0.8498830323192847, "size": 0.6149256865201029}  # fmt: skip
+    runner = Runner("throw", 1, fidelity="accurate", randomize=ball)
+    runner.reset(np.ones(1, dtype=bool), np.array([1266]))
+    for _ in range(8):
+        runner.step(np.array([[-1.0, 1.0, -1.0, -1.0]]))
+    assert np.isfinite(runner.world.position).all()
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
