@@ -145,11 +145,13 @@ class Run:
             except SimulationDiverged as error:
                 if runner is self.runner:
                     self._note("not_finite", dict.fromkeys(error.worlds, str(error)))
-                mask = np.zeros(runner.count, dtype=bool)
-                mask[error.worlds] = True
-                runner.reset(mask)
-                began[: runner.count] |= mask
                 results.append(None)
+        if any(result is None for result in results):
+            # the step of the other worlds was not completed either: all start anew
+            for runner in self._runners:
+                runner.reset(np.ones(runner.count, dtype=bool))
+            began[:] = True
+            results[0] = None
         self._steps += 1
         self._episodes += int(began.sum())
         self._ended = np.zeros(self.runner.count, dtype=bool)
