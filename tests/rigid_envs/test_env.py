@@ -167,7 +167,7 @@ def rollout(env, actions=ACTIONS):
 def in_mid_episode(env_id, env=None):
     """An environment in the middle of an episode, and actions for the rest of it."""
     env = env or make(env_id)
-    actions = ACTIONS if env_id == PUSH else HAND_ACTIONS
+    actions = ACTIONS if env.action_space.shape == (3,) else HAND_ACTIONS
     env.reset(seed=0)
     rollout(env, actions[:20])
     return env, actions[20:]

@@ -25,8 +25,9 @@ HEAD = """\
 
 Trained policies, each evaluated on episodes that it was not trained on, with its mean action.
 `rigid-envs results` generates this page from the files in `results/`; these include the settings,
-the learning curve and the policy of each row. Learning curves show the success of training
-episodes, whose actions are sampled: it is lower than that of the mean action in the tables.
+the learning curve and the policy of each row. Learning curves show the success of the mean action,
+as the tables do; thin grey ones, or all of an older run, that of training episodes, whose actions
+are sampled.
 
 ```sh
 rigid-envs evaluate results/ppo/RigidEnvs-Push-v0_seed0/policy.safetensors  # measure a policy again

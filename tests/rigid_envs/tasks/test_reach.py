@@ -53,6 +53,15 @@ def test_a_full_action_moves_the_finger_by_a_stride_up_to_the_end_of_its_workspa
     np.testing.assert_allclose(observation["achieved_goal"], ends, atol=0.003)
 
 
+def test_the_dense_reward_of_any_goals_can_be_computed():
+    env = make(REACH, reward_type="dense")
+    env.reset(seed=2)
+    observation, *_, info = env.step(env.action_space.sample())
+    achieved = observation["achieved_goal"]
+    assert env.compute_reward(achieved, achieved, info) == 1.0
+    assert env.compute_reward(achieved, achieved + [0.3, 0.0, 0.4], {}) == pytest.approx(-5.0)
+
+
 def test_the_dense_reward_follows_from_the_distance():
     env = make(REACH, reward_type="dense")
     env.reset(seed=2)
