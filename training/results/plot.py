@@ -20,7 +20,7 @@ POINTS = 200
 """Number of points at which several curves are averaged: more than the plot can resolve."""
 
 Curve = list[dict[str, float]]
-"""Rows of a learning curve: steps, seconds and success rates by column name; NaN where none."""
+"""Rows of a learning curve: steps, seconds and success rates by column name."""
 
 
 def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None) -> Path:
@@ -132,7 +132,7 @@ def mean_and_spread(
 
 def _line(rows: Curve, column: str, unit: float, success: str) -> tuple[np.ndarray, np.ndarray]:
     """X values and success in %, of the rows that have it."""
-    found = [(row[column] / unit, 100 * row[success]) for row in rows if row[success] >= 0.0]
+    found = [(row[column] / unit, 100 * row[success]) for row in rows if success in row]
     x, y = np.array(found).reshape(-1, 2).T
     return x, y
 
@@ -165,7 +165,7 @@ def read_curve(progress: Path) -> Curve:
     try:
         with progress.open(encoding="utf-8", newline="") as file:
             rows = [
-                {column: float(row.get(column) or "nan") for column in (*columns, EVALUATED)}
+                {name: float(row[name]) for name in (*columns, EVALUATED) if row.get(name)}
                 for row in csv.DictReader(file)
                 if all(row.get(column) for column in columns)
             ]
