@@ -79,6 +79,7 @@ def flat(observation: dict[str, Array]) -> Array:
 def train(options: argparse.Namespace) -> float:
     """Trains an agent and prints its progress; returns the last success rate."""
     torch.manual_seed(options.seed)
+    torch.set_num_threads(options.threads)
     envs = gym.make_vec(
         options.env, num_envs=options.num_envs, autoreset_mode=AutoresetMode.SAME_STEP
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -23,6 +24,7 @@ def test_ppo_runs_for_a_few_updates(ppo, capsys):
     words = ["--num-envs", "64", "--total-steps", "9600", "--batch-size", "1600", "--stop-at", "2"]
     success = ppo["train"](ppo["parse"](words))
     assert 0.0 <= success <= 1.0
+    assert torch.get_num_threads() == 1  # whatever the number of cores
     assert capsys.readouterr().out.count("solved") == 3
 
 

@@ -147,7 +147,7 @@ class Run:
                     self._note("not_finite", dict.fromkeys(error.worlds, str(error)))
                 results.append(None)
         if any(result is None for result in results):
-            # the step of the other worlds was not completed either: all start anew
+            # the other worlds haven't completed their step either: all are reset
             for runner in self._runners:
                 runner.reset(np.ones(runner.count, dtype=bool))
             began[:] = True

@@ -153,7 +153,7 @@ def _success(
     """Trains with the settings of a trial and returns the success rate of the policy."""
     drawn = with_drawn(config, draw(config.algo, trial))
     seed = (config.seed or 0) + trial.number
-    drawn = drawn.replace("search", seed=seed, target_success_rate=None)
+    drawn = drawn.replace("search", seed=seed, target_success_rate=None, eval_freq=0)
     with tempfile.TemporaryDirectory() as folder:
         trained = train(
             drawn,
