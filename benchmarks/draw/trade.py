@@ -16,6 +16,13 @@ from benchmarks.trade.store import Row, digest
 # in the metadata of a PNG
 DIGEST = "Figures"
 COLORS = {"springs": "#c8553d", "impulses": "#8e5aa8", "rotation": "#c8553d", PEER: "#3d6fb6"}
+# a setting; a thin line joins those that differ in one number alone
+KINDS = {
+    "springs": "settings, spring law",
+    "impulses": "settings, impulse law",
+    PEER: "settings, MuJoCo",
+}
+SETTING = {"linewidth": 0.6, "marker": ".", "markersize": 3.5, "alpha": 0.35}
 LEAST = 1e-7  # errors below it are drawn at it
 DPI = 110
 PANEL = (3.1, 2.7)  # inches
@@ -54,6 +61,12 @@ def draw(
     ]
     mark = {"marker": "o", "markerfacecolor": "white", "markeredgewidth": 1.6, "linewidth": 0}
     handles.append(Line2D([], [], color=INK, label="presets", **mark))  # type: ignore[arg-type]
+    handles += [
+        Line2D([], [], color=COLORS[kind], label=label, **SETTING)  # type: ignore[arg-type]
+        for kind, label in KINDS.items()
+    ]
+    # the fronts in the first row, the settings in the second; the legend fills columns
+    handles = [handles[k] for k in (0, 3, 1, 4, 2, 5)]
     figure.legend(
         handles=handles, loc="outside upper center", ncols=3, frameon=False, fontsize=9
     )  # fmt: skip
@@ -79,8 +92,7 @@ def _panel(axes: Axes, rows: Sequence[Row], worlds: str) -> None:
             continue
         kind = engine if engine == PEER else curve.split(",")[0]
         color = COLORS.get(kind, COLORS["rotation"])
-        axes.plot(*_points(points, worlds), color=color, linewidth=0.6, marker=".",
-                  markersize=3.5, alpha=0.35)  # fmt: skip
+        axes.plot(*_points(points, worlds), color=color, **SETTING)  # type: ignore[arg-type]
     for engine, color in ENGINES.items():
         best = front(rows, engine, worlds)
         axes.plot(*_points(best, worlds), color=color, linewidth=2.2)

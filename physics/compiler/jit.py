@@ -5,9 +5,9 @@ There are three kinds of compiled functions:
 - a `sequence` is a stage that does little but call others, outside of loops over lanes;
 - an `entry` is called from Python, releases the GIL and is cached on disk (see `code_cache`).
 
-The only floating-point licence is `contract` (fused multiply-add). Every world runs the same
-instructions in its own vector lane, so its result is bitwise independent of the other lanes; NaN
-and infinity keep their meaning.
+Products are fused with sums as `fusion` says; LLVM has no other licence to change floating-point
+arithmetic. Every world runs the same operations in its own vector lane, so its result is bitwise
+independent of its lane and of the other lanes; NaN and infinity keep their meaning.
 """
 
 import gc
@@ -40,7 +40,7 @@ LANES = 16
 # `_nrt: False` turns off reference counts: numba would count all arrays of a model and a state with
 # atomic instructions in every call. The price is that kernels can't allocate; working memory comes
 # from Python
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINE: Any = {"forceinline": True, "no_cfunc_wrapper": True, **_OPTIONS}
 _STAGE: Any = {"pipeline_class": StagePipeline, **_INLINE}
 

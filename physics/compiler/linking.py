@@ -13,6 +13,8 @@ links the optimised code, inlines it and optimises the whole again. Only the ker
   the others;
 - passes that treat language features which kernels don't use are left out.
 
+Products are fused with sums before all this, see `fusion`.
+
 docs/decisions/0015-linked-functions.md has the compile times.
 """
 
@@ -20,6 +22,7 @@ from copy import copy
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, Flags, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
@@ -41,6 +44,7 @@ from numba.core.untyped_passes import (
 )
 
 from physics.compiler.code_cache import StageFile, is_cacheable
+from physics.compiler.fusion import fuse_products
 
 # what remains of numba's default pipeline before the lowering
 _BEFORE_LOWERING = (
@@ -89,6 +93,15 @@ class _Codegen:
 class _Library(JITCodeLibrary):
     """The code of a kernel, with the functions within it."""
 
+    def add_ir_module(self, ir_module: Any) -> None:
+        """As numba's, with fused products."""
+        self._raise_if_finalized()
+        text = fuse_products(cgutils.normalize_ir_text(str(ir_module)))
+        ll_module = llvm.parse_assembly(text)
+        ll_module.name = ir_module.name
+        ll_module.verify()
+        self.add_llvm_module(ll_module)
+
     def _optimize_functions(self, ll_module: Any) -> None:
         """Simplifies each new function, with three of the passes that numba runs here.
 
@@ -106,8 +119,13 @@ class _Library(JITCodeLibrary):
                 manager.run(function, builder)
 
     def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager()
-        manager.run(self._final_module, builder)
+        # Loops that are unrolled first are not vectorised; and a fused product and sum count as one
+        # operation, so more loops were short enough to be unrolled
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
+        options.loop_unrolling = False
+        options.loop_vectorization = options.slp_vectorization = True
+        builder = llvm.create_pass_builder(self._codegen._tm, options)
+        builder.getModulePassManager().run(self._final_module, builder)
 
 
 class _LinkedLibrary(_Library):

@@ -1,8 +1,6 @@
 """Damping coefficients of the normal force, from the restitution that a user asks for."""
 
-import math
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
@@ -18,38 +16,56 @@ _LEAST_RESTITUTION = 5e-4
 REST_DAMPING = 0.5
 
 
-def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Root of an increasing function, to round-off."""
+def _bisect(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Roots of increasing functions, one an element, to round-off."""
     for _ in range(200):
         middle = 0.5 * (low + high)
-        if middle in (low, high):  # nothing is left between them
+        between = (middle != low) & (middle != high)
+        if not between.any():
             break
-        if function(middle) < 0.0:
-            low = middle
-        else:
-            high = middle
+        below = function(middle) < 0.0
+        low = np.where(between & below, middle, low)
+        high = np.where(between & ~below, middle, high)
     return 0.5 * (low + high)
 
 
-def clamped_dashpot_restitution(zeta: float) -> float:
+def clamped_dashpot_restitution(zeta: Array) -> Array:
     """Restitution of f = max(0, k d + c d') at the damping ratio zeta.
 
     The contact ends where the acceleration vanishes; there the speed is v exp(-zeta omega t).
     """
-    if zeta < 1.0:
-        damped = math.sqrt(1.0 - zeta**2)
-        return math.exp(-zeta / damped * (math.pi - 2.0 * math.atan2(zeta, damped)))
-    if zeta == 1.0:
-        return math.exp(-2.0)
-    over = math.sqrt(zeta**2 - 1.0)
-    return math.exp(-zeta / over * 2.0 * math.log(zeta + over))
+    root = np.sqrt(np.abs(1.0 - zeta**2))
+    under = np.pi - 2.0 * np.arctan2(zeta, root)
+    duration = np.where(zeta < 1.0, under, 2.0 * np.log(zeta + root))
+    critical = root == 0.0
+    return np.exp(-zeta * np.where(critical, 2.0, duration / np.where(critical, 1.0, root)))
 
 
 def damping_coefficients(restitution: Array, law: str) -> Array:
-    """`damping_coefficient` of an array of restitutions; equal values are computed once."""
+    """Dimensionless damping: a of the "hunt_crossley" law, the ratio zeta of the "dashpot".
+
+    Args:
+        restitution: of any number of contacts.
+        law: of the damping.
+    """
     values, where = np.unique(restitution, return_inverse=True)
-    found = [damping_coefficient(e, law) for e in values.tolist()]
-    return np.array(found)[where].reshape(restitution.shape)
+    e = np.clip(values, _LEAST_RESTITUTION, 1.0)
+    if law == "dashpot":
+        zeros, most = np.zeros(e.shape), np.full(e.shape, 100.0)
+        found = _bisect(lambda zeta: e - clamped_dashpot_restitution(zeta), zeros, most)
+    else:
+        found = _hunt_crossley(e)
+    return np.where(e < 1.0, found, 0.0)[where].reshape(restitution.shape)
+
+
+def _hunt_crossley(e: Array) -> Array:
+    # with s = -ln(1 - a e) the equation is well conditioned up to a = 1/e
+    def excess(s: Array) -> Array:
+        a = -np.expm1(-s) / e
+        return np.asarray(s + np.log1p(a) - a * (1.0 + e))
+
+    # excess falls from 0 before it rises through the root
+    return np.asarray(-np.expm1(-_bisect(excess, 1.2 * (1.0 - e), 2.0 / e)) / e)
 
 
 def damping_errors(restitution: Array, damping: Array, law: str) -> Array:
@@ -82,24 +98,6 @@ def damping_errors(restitution: Array, damping: Array, law: str) -> Array:
     bounces = e < 1.0 - 1e-6  # above, the difference below is round-off
     slope = np.where(bounces, 24.0 * (e * e * out - back), 1.0)
     return np.where(bounces, (1.0 - e * e) * out * back / slope, 1.0 / 12.0)
-
-
-@lru_cache(maxsize=4096)
-def damping_coefficient(restitution: float, law: str) -> float:
-    """Dimensionless damping: a of the "hunt_crossley" law, the ratio zeta of the "dashpot"."""
-    e = max(restitution, _LEAST_RESTITUTION)
-    if e >= 1.0:
-        return 0.0
-    if law == "dashpot":
-        return _bisect(lambda zeta: e - clamped_dashpot_restitution(zeta), 0.0, 100.0)
-    # with s = -ln(1 - a e) the equation is well conditioned up to a = 1/e
-
-    def excess(s: float) -> float:
-        a = -math.expm1(-s) / e
-        return s + math.log1p(a) - a * (1.0 + e)
-
-    # excess falls from 0 before it rises through the root
-    return -math.expm1(-_bisect(excess, 1.2 * (1.0 - e), 2.0 / e)) / e
 
 
 def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:

@@ -55,10 +55,10 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     lines += ["", "Leaves out"]
     lines += [f"  {line}" for line in _left_out(scene, fidelity, features)]
     lines += ["", "Steps"]
-    lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
     refused = _refusal(scene, fidelity)
     if refused:
         lines.append(f"  a World refuses it: {refused}")
+    lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
     if len(model.half_pair):
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
@@ -174,15 +174,20 @@ def _steps(
     by_fields = longest_step(few, model, fidelity.integrator)[0] if few.fields else math.inf
     if by_fields < longest:
         longest, name = by_fields, "a field"
-    yield f"substep {1e3 * step:.4g} ms"
     if math.isinf(longest):
+        yield f"substep {1e3 * step:.4g} ms"
         impulses = fidelity.law == "impulse" and len(model.half_pair) > 0
         why = ", contacts with impulses are stable at any step" if impulses else ""
         yield f"largest stable substep: nothing limits it{why}"
     else:
+        if step <= longest:
+            stable = ": stable whatever touches"
+        elif fidelity.law == "spring":
+            stable = f": stable unless {name} lies flat on several others at once"
+        else:
+            stable = ""
+        yield f"substep {1e3 * step:.4g} ms{stable}"
         yield f"largest substep that is stable whatever touches: {1e3 * longest:.3g} ms, by {name}"
-        if step > longest and fidelity.law == "spring":
-            yield "a longer one is stable unless that lies flat on several others at once"
         solids = (*few.bodies, *few.driven_bodies, *few.statics)
         if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
             yield (

@@ -90,14 +90,16 @@ class Tuned(NamedTuple):
             : _SHOWN - len(near)
         ]
         if near:
-            lines.append(f"{'error' + unit:>12}  {'s/s':>9}  fidelity")
+            lines.append(f"{'error' + unit:>12}  within  {'s/s':>9}  fidelity")
             for e in sorted(near, key=lambda e: e.cost):
+                within = "yes" if e.error <= self.tolerance else "no"
                 mark = "*" if e.fidelity == self.fidelity else " "
                 rate = f"{1.0 / e.cost:,.0f}"
-                lines.append(f"{e.error:12.2g}  {rate:>9} {mark}{code(e.fidelity)}")
+                lines.append(f"{e.error:12.2g}  {within:>6}  {rate:>9} {mark}{code(e.fidelity)}")
             lines.append(
                 f"{len(self.evidence)} fidelities tried; these {len(near)} are within the "
                 "tolerance, or nearest to it, in the order of their speed"
+                + ("; * marks the one above" if self.fidelity else "")
             )
         return "\n".join(lines)
 

@@ -132,17 +132,16 @@ class Camera:
         pixels = local[..., :2] * (scale[..., None] * _DOWN)
         return pixels + np.array([0.5 * width, 0.5 * height]), depth
 
-    def rays(self, width: int, height: int, rows: slice = slice(None)) -> Array:
+    def rays(self, width: int, height: int) -> Array:
         """[height, width, 3], directions of the pixels' middles, with a depth of 1 m.
 
         Args:
             width: of the picture in pixels.
             height: likewise.
-            rows: of which rows; by default of all.
         """
         pixel = 1.0 / self.focal_length(height)
         x = pixel * (np.arange(width) + 0.5 - 0.5 * width)
-        y = pixel * (0.5 * height - np.arange(height)[rows] - 0.5)
+        y = pixel * (0.5 * height - np.arange(height) - 0.5)
         right, up, forward = self.axes
         return np.asarray(forward + x[:, None] * right + y[:, None, None] * up)
 

@@ -15,13 +15,13 @@ from physics.rotation import rotation_matrix
 from physics.scene.validation import instance, integer, number
 from physics.step.threads import run_in_blocks
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.ground import ground
 from rigid_envs.rendering.markers import Overlay, overlay, stacked
 from rigid_envs.rendering.primitives import balls, placed, shape_primitives
 from rigid_envs.rendering.rays.kernel import make_draw
 from rigid_envs.rendering.rays.light import SUN_FRAME, TO_SUN, sun_points
 from rigid_envs.rendering.rays.shadows import MOST_CELLS
 from rigid_envs.rendering.rays.tables import PRIMITIVE
+from rigid_envs.rendering.rays.tiles import make_draw_ground
 from rigid_envs.rendering.view import Arrow, Item, Marker
 
 Array = np.ndarray
@@ -101,7 +101,12 @@ class Renderer:
     @cached_property
     def _ground(self) -> tuple[Array, Array]:
         """Colours and depths of the empty ground."""
-        return ground(self.camera, self.width, self.height, self.floor)
+        size, camera = (self.height, self.width), self.camera
+        picture, depth = np.empty((*size, 3), np.uint8), np.empty(size)
+        shown = camera.distance * np.tan(0.5 * np.radians(camera.field_of_view))
+        target = np.array(camera.target[:2])
+        make_draw_ground()(self._view, target, shown, self.floor is not None, picture, depth)
+        return picture, depth
 
     def frame(
         self, items: Sequence[Item], *, markers: Sequence[Marker] = (), forces: Sequence[Arrow] = ()

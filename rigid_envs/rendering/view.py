@@ -103,7 +103,7 @@ class Mark:
 
     position: Array
     radius: float
-    color: Color = (196, 30, 58)
+    color: Color = (70, 76, 90)
 
     def __post_init__(self) -> None:
         """Checks position and radius."""

@@ -20,6 +20,8 @@ from training.settings.errors import UsageError
 
 DEFAULT_FPS = 25
 SUFFIXES = (".mp4", ".gif")
+SHOWN_AFTER_SUCCESS = 1.0
+"""s of an episode that are shown after its goal is met for good."""
 
 
 def record(
@@ -33,6 +35,8 @@ def record(
     **env_kwargs: Any,
 ) -> tuple[Path, Path]:
     """Records the episodes with the seeds seed, seed + 1, ... of the single environment.
+
+    An episode is shown until a second after its goal is met for good, or until it ends.
 
     Args:
         policy: The policy.
@@ -58,7 +62,7 @@ def record(
     console = Console(quiet=quiet or not sys.stdout.isatty())
     with closing(env), video_writer(video, fps, gif_width) as writer:
         for episode in track(range(episodes), "recording", transient=True, console=console):
-            frames = _render_episode(env, policy, seed + episode)
+            frames = _render_episode(env, policy, seed + episode, round(fps * SHOWN_AFTER_SUCCESS))
             if episode == 0:
                 imageio.imwrite(still, frames[len(frames) // 2])
             for frame in frames:
@@ -103,14 +107,17 @@ def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:
     return imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
 
 
-def _render_episode(env: Any, policy: Policy, seed: int) -> list[np.ndarray]:
+def _render_episode(env: Any, policy: Policy, seed: int, after: int) -> list[np.ndarray]:
+    """Frames of an episode, until `after` steps after its goal is met for good."""
     observation, _ = env.reset(seed=seed)
-    frames = [env.render()]
+    frames, unsolved = [env.render()], 0
     ended = False
     while not ended:
         batch_of_one = {key: np.asarray(value)[None] for key, value in observation.items()}
         action = np.asarray(policy.act(batch_of_one))[0].astype(env.action_space.dtype)
-        observation, _, terminated, truncated, _ = env.step(action)
+        observation, _, terminated, truncated, info = env.step(action)
         frames.append(env.render())
+        if not info.get("is_success", False):
+            unsolved = len(frames)
         ended = terminated or truncated
-    return frames
+    return frames[: unsolved + after]
