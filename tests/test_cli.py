@@ -7,7 +7,18 @@ import pytest
 
 from training.commands import cli, extras, handlers
 
-COMMANDS = ("train", "evaluate", "record", "export", "scripted", "plot", "tune", "demo", "view")
+COMMANDS = (
+    "train",
+    "evaluate",
+    "record",
+    "export",
+    "scripted",
+    "plot",
+    "tune",
+    "demo",
+    "view",
+    "dataset",
+)
 
 
 def test_starts_without_stable_baselines3_and_torch():

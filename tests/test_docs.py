@@ -20,6 +20,7 @@ WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.name)
 def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     (tmp_path / "results").symlink_to(ROOT / "results")
     # of all that `tune` tries on docs/trade.md: two kernels instead of six
     families = tuning.families

@@ -132,6 +132,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     flags.add_results(recording_results)
 
+    dataset = command(
+        "dataset",
+        handlers.dataset,
+        "Record episodes of a policy as a dataset for Minari.",
+        ("data", extras.DATA_EXTRA),
+    )
+    flags.add_dataset(dataset)
+
     tuning = command(
         "tune",
         handlers.tune,

@@ -237,6 +237,37 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(algo=None, device="cpu", stochastic=False, trust_pickle=False)
 
 
+def add_dataset(parser: argparse.ArgumentParser) -> None:
+    """Flags of dataset."""
+    parser.add_argument(
+        "--env", help=f"environment id (default: that of the policy, or {DEFAULT_ENV})"
+    )
+    parser.add_argument(
+        "--policy",
+        default="scripted",
+        metavar="POLICY",
+        help='run folder, .safetensors file, "trained", "scripted" (default) or "random"',
+    )
+    parser.add_argument(
+        "-n",
+        "--episodes",
+        dest="n_episodes",
+        type=count,
+        default=1000,
+        help="number of episodes (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--dataset-id",
+        metavar="NAME",
+        help="name in Minari (default: of environment and policy, as rigid-envs/push/scripted-v0)",
+    )
+    parser.add_argument("--seed", type=whole, help="seed of the first episode (default: 2000000)")
+    parser.add_argument("--replace", action="store_true", help="replace a dataset of the same name")
+    add_environment(parser)
+    # a model.zip is not accepted: it would have to be unpickled
+    parser.set_defaults(algo=None, device="cpu", stochastic=False, trust_pickle=False)
+
+
 def add_results(parser: argparse.ArgumentParser) -> None:
     """Flags of results."""
     parser.add_argument(

@@ -211,6 +211,27 @@ def results(options: argparse.Namespace) -> int:
     return 0
 
 
+def dataset(options: argparse.Namespace) -> int:
+    """Records a dataset of episodes."""
+    from training.datasets import minari_store
+
+    kwargs = env_kwargs_of(options)
+    if options.policy == minari_store.RANDOM:
+        policy = minari_store.random_policy(options.env or DEFAULT_ENV, options.seed or 0, **kwargs)
+    else:
+        policy = policy_of(options)
+    written = minari_store.write_dataset(
+        policy,
+        options.n_episodes,
+        options.dataset_id,
+        seed=minari_store.FIRST_SEED if options.seed is None else options.seed,
+        replace_existing=options.replace,
+        **kwargs,
+    )
+    print(written)
+    return 0
+
+
 def tune(options: argparse.Namespace) -> int:
     """Searches settings and prints the best ones as YAML."""
     config = config_of(options)

@@ -1,0 +1,161 @@
+"""Datasets: Minari reads them back, its environment steps, and episodes can be played again."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+minari = pytest.importorskip("minari", reason="needs the extra data")
+
+from training.commands import cli  # noqa: E402
+from training.datasets.minari_store import default_id, random_policy, write_dataset  # noqa: E402
+from training.policies.policy import scripted_policy  # noqa: E402
+from training.settings.errors import UsageError  # noqa: E402
+
+PUSH, THROW = "RigidEnvs/Push-v0", "RigidEnvs/Throw-v0"
+FAST = {"fidelity": "fast"}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Minari's folder of datasets."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    return tmp_path
+
+
+def replayed(env: gym.Env, episode, seed):
+    """Observations and rewards of an episode's actions after a reset with its seed."""
+    observation, _ = env.reset(seed=seed)
+    observations, rewards = [observation], []
+    for action in episode.actions:
+        observation, reward, *_ = env.step(action)
+        observations.append(observation)
+        rewards.append(reward)
+    return {key: np.stack([o[key] for o in observations]) for key in observations[0]}, rewards
+
+
+@pytest.mark.parametrize(
+    ("env_id", "arguments"),
+    [
+        (PUSH, {"reward_type": "dense"}),
+        (PUSH, {"terminate_on_success": True, "randomize": {"mass": (0.5, 2.0), "noise": 0.1}}),
+        (THROW, {}),
+    ],
+)
+def test_every_episode_can_be_played_again_bit_for_bit(env_id, arguments):
+    policy = scripted_policy(env_id, **FAST, **arguments)
+    written = write_dataset(policy, 5, "again-v0", seed=7)
+    dataset = minari.load_dataset("again-v0")
+    metadata = list(dataset.storage.get_episode_metadata(range(5)))
+    assert [one["seed"] for one in metadata] == [7, 8, 9, 10, 11]
+    env = dataset.recover_environment()
+    assert env.spec.id == env_id
+    steps = 0
+    for episode, one in zip(dataset.iterate_episodes(), metadata, strict=True):
+        observations, rewards = replayed(env, episode, int(one["seed"]))
+        for key, values in observations.items():
+            np.testing.assert_array_equal(episode.observations[key], values, strict=True)
+        np.testing.assert_array_equal(episode.rewards, rewards)
+        assert (episode.terminations | episode.truncations).tolist() == [False] * (
+            len(rewards) - 1
+        ) + [True]
+        assert len(episode.infos["is_success"]) == len(rewards) + 1
+        steps += len(rewards)
+    assert written.steps == steps == dataset.total_steps
+    env.close()
+
+
+def test_pixels_are_stored_without_loss():
+    policy = random_policy(PUSH, obs_type="pixels", pixel_size=16, **FAST)
+    assert write_dataset(policy, 2, "pixels-v0").high_score is None
+    dataset = minari.load_dataset("pixels-v0")
+    env = dataset.recover_environment()
+    for episode in dataset.iterate_episodes():
+        seed = next(iter(dataset.storage.get_episode_metadata([episode.id])))["seed"]
+        observations, _ = replayed(env, episode, int(seed))
+        np.testing.assert_array_equal(
+            episode.observations["observation"], observations["observation"], strict=True
+        )
+    env.close()
+
+
+def test_scores_are_those_of_random_actions_and_of_the_policy():
+    dense = {"reward_type": "dense", **FAST}
+    written = write_dataset(scripted_policy(PUSH, **dense), 20, "scores-v0")
+    storage = minari.load_dataset("scores-v0").storage
+    assert storage.metadata["ref_min_score"] == written.low_score < 0.5 * written.high_score
+    assert storage.metadata["ref_max_score"] == written.high_score
+    assert storage.metadata["algorithm_name"] == "scripted"
+    assert written.high_score == pytest.approx(written.mean_return, rel=0.4)  # 100 and 20 episodes
+    # of random actions, the expert is the scripted controller
+    drawn = write_dataset(random_policy(PUSH, **dense), 20, "random-v0")
+    assert drawn.high_score == written.high_score
+    assert drawn.mean_return < 0.5 * written.mean_return
+
+
+def test_a_dataset_is_replaced_only_if_asked(folder):
+    policy = random_policy(PUSH, **FAST)
+    write_dataset(policy, 2)
+    name = "rigid-envs/push/random-v0"
+    assert default_id(PUSH, "random") == name
+    with pytest.raises(UsageError, match=rf"{name}' exists.*--replace"):
+        write_dataset(policy, 3)
+    assert minari.load_dataset(name).total_episodes == 2
+    write_dataset(policy, 3, replace_existing=True)
+    assert minari.load_dataset(name).total_episodes == 3
+
+
+def test_an_error_leaves_what_was_there(folder):
+    policy = random_policy(PUSH, **FAST)
+    write_dataset(policy, 2, "kept-v0")
+
+    def fails(observation):
+        raise RuntimeError("a bug")
+
+    broken = scripted_policy(PUSH, **FAST)
+    object.__setattr__(broken, "act", fails)
+    with pytest.raises(RuntimeError, match="a bug"):
+        write_dataset(broken, 2, "kept-v0", replace_existing=True)
+    with pytest.raises(RuntimeError, match="a bug"):
+        write_dataset(broken, 2, "new-v0")
+    assert minari.load_dataset("kept-v0").total_episodes == 2
+    assert [path.name for path in folder.iterdir()] == ["kept-v0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "env_id", "policy", "expected"),
+    [
+        ("PushDense", "RigidEnvs/PushDense-v0", "ppo (runs/a b)", "rigid-envs/push-dense/ppo-v0"),
+        ("Stack", "RigidEnvs/Stack-v0", "scripted", "rigid-envs/stack/scripted-v0"),
+    ],
+)
+def test_names(name, env_id, policy, expected):
+    assert default_id(env_id, policy) == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--dataset-id", "no version"], "name of the dataset is 'no version', should be like"),
+        (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
+        (["--episodes", "0"], "should be an integer of at least 1"),
+        (["--policy", "nowhere"], "nowhere"),
+        (["--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
+        (["--env-kwargs", "fidelity:quick"], "quick"),
+    ],
+)
+def test_mistakes_give_one_line(words, complaint, capsys, folder):
+    assert cli.main(["dataset", *words]) == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+    assert not list(folder.iterdir())
+
+
+def test_the_command_writes_a_dataset(capsys):
+    words = "dataset --policy random --episodes 3 --fidelity fast --dataset-id mine/few-v0"
+    assert cli.main(words.split()) == 0
+    shown = capsys.readouterr().out
+    assert "mine/few-v0: 3 episodes, 150 steps" in shown
+    assert 'minari.load_dataset("mine/few-v0")' in shown
+    assert minari.load_dataset("mine/few-v0").total_episodes == 3

@@ -1,0 +1,1 @@
+"""Datasets of episodes, in Minari's format: `record` plays them, `minari_store` writes them."""

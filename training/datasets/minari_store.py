@@ -1,0 +1,244 @@
+"""Writes episodes as a Minari dataset, from which Minari recovers the environment.
+
+A dataset holds the exact specification of its environment, the seed of each episode, the name of
+the policy, and reference scores: the mean returns of random actions and of an expert. Observations
+and actions are stored bit for bit, so playing an episode's actions after `reset(seed=...)` gives
+the same observations again.
+"""
+
+import re
+import shutil
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import minari
+import numpy as np
+from minari.data_collector import EpisodeBuffer
+from minari.storage import get_dataset_path
+
+from training.datasets.record import Recorded, record_episodes
+from training.policies.episodes import play_episodes
+from training.policies.policy import Policy, scripted_policy
+from training.settings.environments import make_single_env, make_vector_env
+from training.settings.errors import UsageError
+
+Array = np.ndarray
+
+FIRST_SEED = 2_000_000
+"""Far from the seeds of training and evaluation."""
+RANDOM = "random"
+WORLDS = 1024
+REFERENCE_EPISODES = 100
+_NAME = re.compile(r"(?:[-_\w]+/)*[-_\w]+-v\d+")
+
+
+@dataclass(frozen=True)
+class Written:
+    """A dataset that was written.
+
+    Attributes:
+        dataset_id: its name in Minari.
+        path: its folder.
+        episodes: their number.
+        steps: of all episodes.
+        success: fraction of the episodes whose goal was met at the end.
+        mean_return: mean sum of rewards.
+        low_score: mean return of random actions.
+        high_score: that of the expert; None if there is none.
+        seconds: s that all of it took.
+    """
+
+    dataset_id: str
+    path: Path
+    episodes: int
+    steps: int
+    success: float
+    mean_return: float
+    low_score: float
+    high_score: float | None
+    seconds: float
+
+    def __str__(self) -> str:
+        """What was written, and how to read it."""
+        high = "none" if self.high_score is None else f"{self.high_score:.2f}"
+        return (
+            f"{self.dataset_id}: {self.episodes:,} episodes, {self.steps:,} steps, "
+            f"{self.success:.1%} solved, in {self.seconds:.1f} s\n"
+            f"mean return {self.mean_return:.2f} (random actions {self.low_score:.2f}, "
+            f"expert {high})\n"
+            f"in {self.path}\n"
+            f'to read it: minari.load_dataset("{self.dataset_id}")'
+        )
+
+
+def random_policy(env_id: str, seed: int = 0, **env_kwargs: Any) -> Policy:
+    """Actions that are uniform in the action space."""
+    with closing(make_single_env(env_id, **env_kwargs)) as env:
+        low, high = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
+    draw = np.random.default_rng(seed)
+
+    def act(observation: dict[str, Array]) -> Array:
+        count = len(next(iter(observation.values())))
+        return np.asarray(draw.uniform(low, high, (count, *low.shape)))
+
+    return Policy(act, env_id, RANDOM, env_kwargs)
+
+
+def default_id(env_id: str, policy: str) -> str:
+    """The name of a dataset, as rigid-envs/push-dense/scripted-v0."""
+    name = env_id.rpartition("/")[2].rpartition("-v")[0]
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
+    algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
+    return f"rigid-envs/{words}/{algorithm}-v0"
+
+
+def write_dataset(
+    policy: Policy,
+    episodes: int,
+    dataset_id: str | None = None,
+    *,
+    seed: int = FIRST_SEED,
+    replace_existing: bool = False,
+    report: Callable[[int], None] = lambda _: None,
+    **env_kwargs: Any,
+) -> Written:
+    """Plays the episodes with the seeds seed, seed + 1, ... and writes them to Minari's folder.
+
+    Args:
+        policy: what acts.
+        episodes: their number.
+        dataset_id: (namespace/)name-v0; by default from the environment and the policy.
+        seed: of the first episode.
+        replace_existing: whether a dataset of this name may be replaced.
+        report: called with the number of episodes that have ended.
+        env_kwargs: arguments of the environment that replace those of the policy.
+
+    Raises:
+        UsageError: a dataset of this name exists, the name or a number is invalid, the folder can't
+            be written, or the environment rejects its arguments.
+    """
+    start = time.perf_counter()
+    if episodes < 1:
+        raise UsageError(f"number of episodes is {episodes}, should be at least 1")
+    name = default_id(policy.env_id, policy.name) if dataset_id is None else dataset_id
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0"
+        )
+    arguments = {**policy.env_kwargs, **env_kwargs}
+    with _place(name, replace_existing) as path:
+        recorded = _play(policy, episodes, seed, arguments, report)
+        low, high = _scores(policy, arguments)
+        _write(name, policy, arguments, recorded, low, high)
+    returns = [float(one.rewards.sum(dtype=float)) for one in recorded]
+    return Written(
+        name, path, episodes, sum(len(one.rewards) for one in recorded),
+        float(np.mean([one.success[-1] for one in recorded])), float(np.mean(returns)),
+        low, high, time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def _play(
+    policy: Policy,
+    episodes: int,
+    seed: int,
+    arguments: dict[str, Any],
+    report: Callable[[int], None],
+) -> list[Recorded]:
+    worlds = min(episodes, WORLDS)
+    recorded: list[Recorded] = []
+    with closing(make_vector_env(policy.env_id, worlds, **arguments)) as envs:
+        for first in range(0, episodes, worlds):
+            recorded += record_episodes(envs, policy.act, seed + first, report)
+    return recorded[:episodes]
+
+
+def _scores(policy: Policy, arguments: dict[str, Any]) -> tuple[float, float | None]:
+    """Mean returns of random actions, and of the policy; of the scripted one if it is random.
+
+    A scripted controller reads the state, so there is no expert where pixels are observed.
+    """
+    low = _mean_return(random_policy(policy.env_id, **arguments))
+    expert = policy
+    if policy.name == RANDOM:
+        if arguments.get("obs_type", "state") != "state":
+            return low, None
+        try:
+            expert = scripted_policy(policy.env_id, **arguments)
+        except UsageError:
+            return low, None
+    return low, _mean_return(replace(expert, env_kwargs=arguments))
+
+
+def _mean_return(policy: Policy) -> float:
+    with closing(make_vector_env(policy.env_id, REFERENCE_EPISODES, **policy.env_kwargs)) as envs:
+        return float(play_episodes(envs, policy.act, FIRST_SEED).episode_return.mean())
+
+
+def _write(
+    name: str,
+    policy: Policy,
+    arguments: dict[str, Any],
+    recorded: Sequence[Recorded],
+    low: float,
+    high: float | None,
+) -> None:
+    buffers = [
+        EpisodeBuffer(
+            id=n, seed=one.seed, observations=one.observations, actions=one.actions,
+            rewards=list(one.rewards), terminations=list(one.terminated),
+            truncations=list(one.truncated), infos={"is_success": one.success},
+        )
+        for n, one in enumerate(recorded)
+    ]  # fmt: skip
+    with closing(make_single_env(policy.env_id, **arguments)) as env, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".* is set to None")
+        minari.create_dataset_from_buffers(
+            name, buffers, env=env.spec, eval_env=env.spec, algorithm_name=policy.name,
+            observation_space=env.observation_space, action_space=env.action_space,
+            ref_min_score=None if high is None else low, ref_max_score=high,
+            num_episodes_average_score=REFERENCE_EPISODES,
+            description=f"{len(recorded)} episodes of {policy.env_id} by {policy.name}; each "
+            "starts with reset(seed=...) of the seed in its metadata",
+            requirements=[f"rigid-envs=={_version()}"], jpeg_encoding=False,
+        )  # fmt: skip
+
+
+def _version() -> str:
+    try:
+        return metadata.version("rigid-envs")
+    except metadata.PackageNotFoundError:
+        return "0"
+
+
+@contextmanager
+def _place(name: str, replace_existing: bool) -> Iterator[Path]:
+    """The folder of a new dataset. If writing fails nothing is left, and an old one is kept."""
+    try:
+        path = Path(get_dataset_path(name))
+    except OSError as error:
+        raise UsageError(f"the folder of datasets cannot be written: {error}") from None
+    old = path.with_name(f".{path.name}.old")
+    if path.exists():
+        if not replace_existing:
+            raise UsageError(
+                f"a dataset {name!r} exists, in {path}: choose another --dataset-id, or --replace"
+            )
+        shutil.rmtree(old, ignore_errors=True)
+        path.rename(old)
+    try:
+        yield path
+    except BaseException as error:
+        shutil.rmtree(path, ignore_errors=True)
+        if old.exists():
+            old.rename(path)
+        if isinstance(error, OSError):
+            raise UsageError(f"{path} cannot be written: {error}") from None
+        raise
+    shutil.rmtree(old, ignore_errors=True)
