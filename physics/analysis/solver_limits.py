@@ -12,7 +12,7 @@ def check_solver(scene: Scene, fidelity: Fidelity, crowd: bool) -> None:
     if fidelity.solver != "newton":
         return
     problem = (
-        "Fidelity.solver 'newton' solves for the contacts of a few free bodies; the scene has "
+        "Fidelity.solver 'newton' solves for the contacts of at most 32 free bodies; the scene has "
     )
     instead = ": use solver='gauss_seidel' with contact_resolution=1.8"
     if crowd:

@@ -141,6 +141,8 @@ class Fidelity:
         }
         for name, (low, high) in limits.items():
             setting = f"solver={self.solver!r}" if newton else f"law={self.law!r}"
+            if self.law == "impulse" and not newton:
+                setting += " and solver='gauss_seidel'"
             with_law = f" with {setting}" if name == "contact_resolution" else ""
             value = number(f"Fidelity.{name}{with_law}", getattr(self, name), low=low, high=high)
             object.__setattr__(self, name, value)

@@ -15,7 +15,7 @@ from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features
 from physics.model.tables import Model
 from physics.scene.drives import Drive
-from physics.scene.fidelity import Fidelity
+from physics.scene.fidelity import PRESETS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground
 from physics.tuning.candidates import can_touch, safe_speed
@@ -26,6 +26,9 @@ from physics.world import World
 
 Array = np.ndarray
 
+_TURN = 0.6  # rad in a substep, by which a jointed body may turn, see docs/joints.md
+# contact resolutions of impulses at which stacks stand, see docs/physics.md
+_STIFF, _NEWTON = PRESETS["solid"].contact_resolution, 50.0
 _KINDS = 6  # different bodies that are listed
 _PAIRS = 12  # different contacts that are listed
 
@@ -53,12 +56,13 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     lines = [code(fidelity), "", "Models"]
     lines += [f"  {line}" for line in _modelled(scene, fidelity, features)]
     lines += ["", "Leaves out"]
-    lines += [f"  {line}" for line in _left_out(scene, fidelity, features)]
+    lines += [f"  {line}" for line in _left_out(scene, fidelity, features)] or ["  nothing"]
     lines += ["", "Steps"]
     refused = _refusal(scene, fidelity)
     if refused:
         lines.append(f"  a World refuses it: {refused}")
-    lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
+    else:
+        lines += [f"  {line}" for line in _steps(scene, few, fidelity, model, features)]
     if len(model.half_pair):
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
@@ -151,11 +155,18 @@ def _left_out(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[
         solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
         if any(solid.material.stiffness is not None for solid in solids):
             yield "elastic deformation: impulses use Material.stiffness only for soft contacts"
+        soft = _STIFF if fidelity.solver == "gauss_seidel" else _NEWTON
+        if fidelity.contact_resolution < soft:
+            yield (
+                f"stiffness under load: contact_resolution={soft:g} suits this solver, at "
+                f"{fidelity.contact_resolution:g} stacks are softer"
+            )
     speed, thin = safe_speed(scene, fidelity)
     if fidelity.time_control == "fixed" and math.isfinite(speed):
+        impulses = "" if fidelity.law == "impulse" else "law='impulse' with "
         yield (
             f"impacts within a step: what is faster than {speed:.3g} m/s can pass through the "
-            f"thinnest solid, {1e3 * thin:.3g} mm; time_control='swept' prevents it"
+            f"thinnest solid, {1e3 * thin:.3g} mm; {impulses}time_control='swept' prevents it"
         )
     if touching and fidelity.geometry == "shape":
         yield f"sharp edges: boxes are rounded by {100 * fidelity.rounding:.3g} % of a half width"
@@ -176,6 +187,8 @@ def _steps(
         longest, name = by_fields, "a field"
     if math.isinf(longest):
         yield f"substep {1e3 * step:.4g} ms"
+        if few.joints:
+            yield f"a jointed body that turns faster than {_TURN / step:.3g} rad/s loses energy"
         impulses = fidelity.law == "impulse" and len(model.half_pair) > 0
         why = ", contacts with impulses are stable at any step" if impulses else ""
         yield f"largest stable substep: nothing limits it{why}"
@@ -191,8 +204,8 @@ def _steps(
         solids = (*few.bodies, *few.driven_bodies, *few.statics)
         if all(solid.material.stiffness is None for solid in solids) and len(model.half_pair):
             yield (
-                "no material gives a stiffness: shorter substeps make contacts stiffer, and this "
-                "limit shorter, longer ones both softer and longer"
+                "this limit scales with the substep, because no material gives a stiffness: "
+                "contacts are as stiff as the substep allows"
             )
 
 

@@ -12,6 +12,7 @@ from physics.tuning.candidates import can_touch
 from physics.tuning.motion import Course, simulate
 
 _FRAME, _FRAMES = 0.02, 5  # s
+_GROUPS = 32  # lane groups that are timed: enough that the next one's data must be loaded
 
 
 class Part(NamedTuple):
@@ -36,7 +37,7 @@ def parts_cost(scene: Scene, fidelity: Fidelity, worlds: int) -> list[Part]:
     """
     found, before = [], 0.0
     for name, partial in _steps(scene):
-        course = Course(partial, _FRAMES, _FRAME, worlds)
+        course = Course(partial, _FRAMES, _FRAME, worlds if worlds == 1 else worlds * _GROUPS)
         simulated = simulate(course, fidelity)
         if simulated.motion is None:
             found.append(Part(name, math.inf, simulated.note))

@@ -120,7 +120,11 @@ def find_reference(
     other = converged(course, metric, tolerance, second, 0.5 * budget)
     known = [r for r in (reference, other) if r.uncertainty <= CONVERGED * tolerance]
     if law is None and known and known[0] is other:
-        return other  # only the other law converges
+        changes = reference.uncertainty
+        why = f"changes by {changes:.2g} by halving" if changes < math.inf else "takes no step"
+        return other._replace(
+            description=f"{other.description} (the {first} law has not converged: it {why})"
+        )
     if reference.motion is not None and other.motion is not None and len(known) == 2:
         apart = float(metric.distance(other.motion, reference.motion).max())
         return reference._replace(disagreement=apart)

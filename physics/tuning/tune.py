@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from physics.scene.fidelity import LAWS, Fidelity
@@ -73,6 +74,18 @@ class Tuned(NamedTuple):
                 f"{self.metric} error {self.error:.2g}{unit} (tolerance {self.tolerance:g}{unit}), "
                 f"{1.0 / self.cost:,.0f} simulated s/s on one thread"
             )
+            worse = [
+                e for e in self.evidence
+                if e.fidelity == replace(self.fidelity, substep=e.fidelity.substep,
+                                         collision_substeps=e.fidelity.collision_substeps)
+                and e.fidelity.substep < self.fidelity.substep and e.error > self.tolerance
+            ]  # fmt: skip
+            if worse:
+                lines.append(
+                    f"caution: at {1e3 * worse[0].fidelity.substep:.3g} ms, a shorter step, the "
+                    f"error is {worse[0].error:.2g}{unit}. The motion is sensitive: try a shorter "
+                    "time, or other starts"
+                )
         if METRICS[self.metric].needs_reference and self.reference.motion is not None:
             lines.append(
                 f"reference: {self.reference.description}; halving its step changes it by "
@@ -245,11 +258,11 @@ def _unknown(reference: Reference, metric: Metric, tolerance: float, time: float
         )
     if reference.horizon > 0.0:
         until = (
-            f"it is known well enough for the first {reference.horizon:g} of {time:g} s: tune with "
-            f"time={reference.horizon:g}, or with metric='penetration'"
+            f"it is known well enough for the first {reference.horizon:g} of {time:g} s: tune for "
+            f"{reference.horizon:g} s, or with the metric penetration"
         )
     else:
-        until = "not even its first frame is known: tune with metric='penetration'"
+        until = "not even its first frame is known: tune with the metric penetration"
     return f"the motion is chaotic, or needs shorter steps than can be tried: {changes}; {until}"
 
 

@@ -110,7 +110,8 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--policy", default="scripted", metavar="POLICY",
-        help='whose actions are repeated: run folder, .safetensors file or "scripted" (default)',
+        help='whose actions are repeated: run folder, .safetensors file, "trained" or "scripted" '
+        "(default)",
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=positive, default=1e-3,
@@ -125,7 +126,9 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
         "--time", type=positive, default=1.0, help="s of each episode (default: %(default)s)"
     )
     parser.add_argument(
-        "--law", help="contact law of the reference: spring or impulse (default: impulse)"
+        "--law",
+        help="contact law of the reference: spring or impulse (default: impulse, or spring where "
+        "only that converges)",
     )
     parser.add_argument("--seed", type=whole, help="of the first episode (default: 0)")
     add_env_kwargs(parser)

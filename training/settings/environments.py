@@ -103,7 +103,8 @@ def _make(env_id: str, env_kwargs: dict[str, Any], make: Callable[[], Made]) -> 
         return make()
     # Gymnasium checks some arguments by assert
     except (TypeError, ValueError, AssertionError, gym.error.Error) as error:
-        raise UsageError(f"{env_id} rejects {env_kwargs}: {error}") from error
+        own = "" if env_id.startswith("RigidEnvs/") else " (it is not an environment of rigid-envs)"
+        raise UsageError(f"{env_id}{own} rejects {env_kwargs}: {error}") from error
 
 
 def _spec(env_id: str) -> Any:

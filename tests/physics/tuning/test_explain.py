@@ -68,7 +68,7 @@ def test_the_largest_step_does_not_depend_on_the_number_of_bodies():
     for n in (12, 13, 20):
         bodies = [Body(Sphere(0.02), mass=0.1, material=stiff, position=(0, 0, 0.02 + 0.05 * i))
                   for i in range(n)]  # fmt: skip
-        text = Fidelity().explain(Scene(bodies, [Ground(stiff)]), costs=False)
+        text = Fidelity(substep=0.2e-3).explain(Scene(bodies, [Ground(stiff)]), costs=False)
         found.add(re.search(r"stable whatever touches: ([\d.]+) ms", text)[1])
     assert len(found) == 1
 
@@ -96,3 +96,28 @@ def test_costs_add_up_to_the_whole():
 def test_many_bodies_are_listed_by_kind():
     text = Fidelity().explain(tower(100), costs=False)
     assert len(section(text, "Contacts").splitlines()) == 4
+
+
+def test_a_refused_step_is_not_called_stable():
+    stiff = Material(0.5, 0.0, stiffness=1e6)
+    scene = Scene([Body(Box((0.02, 0.02, 0.02)), mass=0.1, material=stiff)], [Ground(stiff)])
+    text = section(Fidelity(substep=0.05).explain(scene, costs=False), "Steps")
+    assert "a World refuses it" in text
+    assert "stable whatever" not in text
+    assert "stable unless" not in text
+
+
+def test_what_prevents_passing_through_is_legal():
+    for law in ("spring", "impulse"):
+        text = Fidelity(law=law, substep=1e-3).explain(tower(2), costs=False)
+        assert ("law='impulse' with time_control='swept'" in text) == (law == "spring")
+        assert "time_control='swept' prevents it" in text
+    Fidelity(law="impulse", substep=1e-3, time_control="swept")
+
+
+def test_impulses_name_the_contact_resolution_that_suits_them():
+    soft, stiff = Fidelity(law="impulse"), Fidelity(law="impulse", contact_resolution=1.8)
+    assert "contact_resolution=1.8 suits" in soft.explain(CUBE, costs=False)
+    assert "suits" not in stiff.explain(CUBE, costs=False)
+    newton = Fidelity(law="impulse", solver="newton")
+    assert "contact_resolution=50 suits" in newton.explain(CUBE, costs=False)

@@ -25,11 +25,12 @@ from physics import (
 from physics.reference.closed_forms import slide_distance
 from physics.reference.scenes import GRAVITY, block_on_ground, sphere_on_ground
 from physics.tuning import tune as module
-from physics.tuning.candidates import can_touch, families
+from physics.tuning.candidates import can_touch, families, with_substep
 from physics.tuning.description import code
 from physics.tuning.metrics import METRICS
 from physics.tuning.motion import Course, Motion, simulate
-from physics.tuning.tune import _rounded_up
+from physics.tuning.reference import Reference
+from physics.tuning.tune import Evidence, Tuned, _rounded_up
 
 pytestmark = pytest.mark.usefixtures("shared_kernels")
 
@@ -97,7 +98,7 @@ def test_a_chaotic_motion_is_answered_with_none_and_why():
     assert str(tuned).startswith("no fidelity has a position error of at most 1e-06 m")
     # the time that it advises is one for which a fidelity is found
     tuned = tune(tumbling, 1e-3, time=3.0)
-    advised = float(re.search(r"tune with time=([\d.]+)", tuned.reason)[1])
+    advised = float(re.search(r"tune for ([\d.]+) s", tuned.reason)[1])
     assert 0.1 < advised < 3.0
     reason = tune(tumbling, 1e-3, time=advised).reason
     assert not reason or reason.startswith("the smallest error")
@@ -234,3 +235,17 @@ def test_scenes_in_which_nothing_touches_get_integrators():
     steps = [f.substep for family in families(SLIDE) for f in family.members]
     assert len(steps) == 11 * 19
     assert all(abs(0.04 / h - round(0.04 / h)) < 1e-9 for h in steps)
+
+
+def test_a_shorter_step_with_a_larger_error_is_reported():
+    def tried(substep, error, cost):
+        return Evidence("springs", with_substep(Fidelity(), substep), error, cost)
+
+    best = tried(1e-3, 5e-4, 0.1)
+    reference = Reference(None, 0.0, "none is needed", 1.0)
+    for error, cautious in ((2e-3, True), (2e-4, False)):
+        evidence = (tried(2e-3, 3e-3, 0.05), best, tried(0.5e-3, error, 0.2))
+        found = best.fidelity, best.error, best.cost
+        text = str(Tuned(*found, evidence, reference, "position", 1e-3))
+        assert ("caution: at 0.5 ms, a shorter step, the error is 0.002" in text) == cautious
+        assert text.count(" yes ") == (1 if cautious else 2)
