@@ -217,6 +217,6 @@ RESISTING = replace(RESISTING, material=Material(rolling_resistance=1e-3))
     ],
 )
 def test_a_scene_that_newton_cannot_solve_is_refused(scene, what):
-    message = f"a few free bodies; the scene has {what}: use solver='gauss_seidel'"
+    message = f"at most 32 free bodies; the scene has {what}: use solver='gauss_seidel'"
     with pytest.raises(ValueError, match=message):
         World(scene, NEWTON)
