@@ -107,7 +107,7 @@ def test_linear_learning_rate_survives_saving(quick_ppo, tmp_path):
 
 
 def test_invalid_arguments_are_reported_before_a_folder_is_created(quick_ppo, tmp_path):
-    with pytest.raises(UsageError, match=r"Test/Reach-v0 rejects .*'denze', should be"):
+    with pytest.raises(UsageError, match=r"Test/Reach-v0 .*rejects .*'denze', should be"):
         train(quick_ppo.replace(env_kwargs={"reward_type": "denze"}), tmp_path, quiet=True)
     with pytest.raises(UsageError, match="device is 'gpu'"):
         train(quick_ppo, tmp_path, device="gpu", quiet=True)
