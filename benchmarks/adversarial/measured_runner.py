@@ -25,6 +25,7 @@ Array = np.ndarray
 PARAMETERS = ("scene", "random")
 SIZES = {"push": (0.05, 2.5), "stack": (0.7, 1.4), "throw": (0.5, 1.75)}
 DECADES = 3.0  # of the factor on masses, up and down
+_HEAVY = 1e3  # times its mass, of a body that any preset accepts at these sizes
 _MASS_STREAM = 1 << 20  # of random numbers; no step of an episode uses it for its noise
 
 
@@ -45,6 +46,7 @@ class MeasuredRunner(Runner):
         """Builds the worlds."""
         self._draws_masses = parameters == "random"
         ranges = {"friction": (0.0, 10.0), "restitution": (0.0, 1.0), "size": SIZES[task]}
+        ranges["mass"] = (_HEAVY, _HEAVY)
         randomize = ranges if self._draws_masses else None
         super().__init__(task, count, "dense", preset, threads, randomize=randomize)
         self._masses = np.array([body.mass for body in self.world.scene.bodies])
@@ -54,11 +56,8 @@ class MeasuredRunner(Runner):
         self, mask: Array, seeds: Array | None = None, options: dict[str, Any] | None = None
     ) -> None:
         """Starts episodes, see `Runner.reset`, with their own masses."""
-        draws_masses = self._draws_masses and mask.any()
-        if draws_masses:  # with which any size is accepted
-            self.world.set_parameters(mass=self._masses, worlds=mask)
         super().reset(mask, seeds, options)
-        if draws_masses:
+        if self._draws_masses and mask.any():
             bodies = len(self._masses)
             draws = uniform(self._seeds[mask], self._episodes[mask], bodies, _MASS_STREAM)
             factors = 10.0 ** (DECADES * (2.0 * draws - 1.0))

@@ -42,8 +42,9 @@ class _DriveLoad(NamedTuple):
 class LoadLimits:
     """The least mass of each body of a scene at a fidelity.
 
-    A body is accepted where it is at least as heavy as in the scene, and the others are no heavier:
-    who wrote the scene knows the loads. How small it may become is left to `step_limits`.
+    The scene itself is accepted: who wrote it knows the loads. A body that is lighter in the scene
+    than all that can press on it asks for may be as light in relation to that at other sizes and
+    masses, too.
 
     Args:
         scene: the scene.
@@ -61,6 +62,7 @@ class LoadLimits:
         self._stiffness = np.full(bodies, np.inf)
         self._drives: list[set[_DriveLoad]] = [set() for _ in range(bodies)]
         self._others: list[set[int]] = [set() for _ in range(bodies)]
+        self._accepted = np.ones((1, bodies))  # part of the needed mass that the scene's body has
         if given_stiffness(scene):
             return
         model, _ = build(scene, fidelity)
@@ -77,17 +79,12 @@ class LoadLimits:
             else:
                 self._others[i].add(j)
                 self._others[j].add(i)
+        needed = self._needed(Parameters.of(scene))
+        self._accepted = self._own / np.maximum(needed, self._own)
 
     def least_masses(self, p: Parameters) -> Array:
         """[n, bodies] kg, the least mass of each body at its size and the masses of the others."""
-        least = np.zeros(p.mass.shape)
-        for i, stiffness in enumerate(self._stiffness):
-            for _, needed in self._loads(i, p):
-                least[:, i] += needed / stiffness
-            others = sorted(self._others[i])
-            as_written = (p.mass[:, others] <= self._own[:, others]).all(axis=1)
-            least[as_written, i] = np.minimum(least[as_written, i], self._own[0, i])
-        return least
+        return self._needed(p) * self._accepted
 
     def check(self, p: Parameters, worlds: Any = None) -> None:
         """Raises an error if a body is too light.
@@ -114,6 +111,14 @@ class LoadLimits:
             f"{_above(float(least[row, i]))} kg, a shorter substep, or build the World with "
             "allow_unstable=True"
         )
+
+    def _needed(self, p: Parameters) -> Array:
+        """[n, bodies] kg, masses of which all loads together press each body by `DEEPEST`."""
+        masses = np.zeros(p.mass.shape)
+        for i, stiffness in enumerate(self._stiffness):
+            for _, needed in self._loads(i, p):
+                masses[:, i] += needed / stiffness
+        return masses
 
     def _loads(self, i: int, p: Parameters) -> Iterator[tuple[str, Array]]:
         """What can press on body i: its name, and the stiffness [n] in N/m that it needs."""

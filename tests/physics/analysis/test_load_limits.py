@@ -108,7 +108,7 @@ def test_what_a_range_accepts_is_accepted_anywhere_in_it():
     own = Parameters.of(Scene([light, heavy]))
     draw, accepted = np.random.default_rng(0), 0
     for _ in range(2000):
-        ends = np.sort(10.0 ** draw.uniform(-0.3, 1.5, (2, 1, 2)), axis=0) * own.mass
+        ends = np.sort(10.0 ** draw.uniform(-0.8, 1.0, (2, 1, 2)), axis=0) * own.mass
         sizes = np.sort(draw.uniform(0.8, 1.6, (2, 1, 1)), axis=0) * np.ones((1, 2))
         low, high = (own._replace(mass=m, size=z) for m, z in zip(ends, sizes, strict=True))
         try:
@@ -137,12 +137,26 @@ def test_message_says_what_would_be_right():
     world.set_parameters(mass=float(message.split("at least ")[1].split(" kg")[0]))
 
 
-def test_masses_of_the_scene_are_accepted_and_sizes_at_these_masses():
+def test_masses_of_the_scene_are_accepted_and_as_light_ones_at_other_sizes():
     scene = scenes.push_like(1e-3)
+    needed = least(scenes.push_like(1.0), size=[0.6]) / least(scenes.push_like(1.0))
+    assert 1.0 / 0.6 < needed < 1.0 / 0.6**2
+    np.testing.assert_allclose(least(scene, size=[0.6]), 1e-3 * needed, rtol=1e-12)
     world = World(scene, count=2, per_world_parameters=True)
-    world.set_parameters(mass=[[1e-3], [2e-3]], size=[[1.0], [0.6]])
+    world.set_parameters(mass=[[1e-3], [3e-3]], size=[[1.0], [0.6]])
     with pytest.raises(ValueError, match=r"0\.0009 kg.*at least 0\.001 kg"):
         world.set_parameters(mass=9e-4)
+    with pytest.raises(ValueError, match=r"mass 0\.001 kg of body 0 in world 1 is too small"):
+        world.set_parameters(mass=1e-3, size=[[1.0], [0.6]])
+
+
+def test_a_body_with_the_mass_of_its_scene_is_refused_where_its_size_makes_it_too_light():
+    """A ball of Throw with 0.58 times its size went through the ground at `fast`."""
+    scene = scenes.push_like(1.05 * least(scenes.push_like(1.0))[0])
+    world = World(scene, per_world_parameters=True)
+    world.set_parameters(size=0.98)
+    with pytest.raises(ValueError, match=r"body 0 in world 0 is too small.*0\.0232 m"):
+        world.set_parameters(size=0.58)
 
 
 def test_what_can_not_press_does_not_count():
