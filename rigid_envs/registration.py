@@ -7,7 +7,14 @@ import gymnasium as gym
 from rigid_envs.tasks import TASKS
 
 # names in ids: those of tasks
-NAMES = {"Push": "push", "Reach": "reach", "Slide": "slide", "Stack": "stack", "Throw": "throw"}
+NAMES = {
+    "Push": "push",
+    "PushT": "push_t",
+    "Reach": "reach",
+    "Slide": "slide",
+    "Stack": "stack",
+    "Throw": "throw",
+}
 # id: arguments of the environment
 ENVIRONMENTS: dict[str, dict[str, Any]] = {
     f"RigidEnvs/{name}{kind}-v0": {"task": task, **reward}

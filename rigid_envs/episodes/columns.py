@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
-from rigid_envs.tasks.goals import goal_distance
+from rigid_envs.tasks.goals import MEASURES, Measure
 
 Array = np.ndarray
 
@@ -28,7 +27,7 @@ class Observed(NamedTuple):
         outside: [count] bool, whether any component of a world was clipped.
         goals: [count, 2 goal] float32, achieved and desired side by side, as `rewards.join_goals`
             gives them; [0, 2 goal] if nobody asks.
-        goal_distance: [count] m, as `goals.distance` gives it, in every bit.
+        goal_distance: [count], as `goals.distance` gives it, in every bit.
     """
 
     observation: Array
@@ -40,8 +39,8 @@ class Observed(NamedTuple):
 
 
 @cache
-def _make_split() -> Any:
-    sources = SOURCES
+def _make_split(measure: Measure) -> Any:
+    sources = MEASURES
 
     @entry
     def split(table, low, high, goals, rows):
@@ -76,7 +75,7 @@ def _make_split() -> Any:
                         to_desired[i] = goal[i]
             achieved, desired = table[n:, start:end], goals[:, start:end]
             for i in range(end - start):
-                rows.goal_distance[start + i] = goal_distance(achieved, desired, i)
+                rows.goal_distance[start + i] = measure(achieved, desired, i)
             if rows.goals.shape[0] > 0:
                 size = goals.shape[0]
                 for i in range(end - start):
@@ -87,7 +86,9 @@ def _make_split() -> Any:
     return split
 
 
-def split(table: Array, low: Array, high: Array, goals: Array, joins: bool) -> Observed:
+def split(
+    table: Array, low: Array, high: Array, goals: Array, joins: bool, measure: Measure
+) -> Observed:
     """Clips a table of observations to their bounds, in place, and copies it into rows.
 
     NaN stays NaN.
@@ -98,6 +99,7 @@ def split(table: Array, low: Array, high: Array, goals: Array, joins: bool) -> O
         high: [n + goal] float32.
         goals: [count, goal] float32, Fortran-contiguous: the desired ones.
         joins: whether to write `Observed.goals`.
+        measure: of the goal distance.
     """
     count, goal = goals.shape
     rows = Observed(
@@ -108,13 +110,13 @@ def split(table: Array, low: Array, high: Array, goals: Array, joins: bool) -> O
         np.empty((count if joins else 0, 2 * goal), dtype=np.float32),
         np.empty(count),
     )
-    _make_split()(table, low, high, goals.T, rows)
+    _make_split(measure)(table, low, high, goals.T, rows)
     return rows
 
 
 @cache
 def _make_clip_actions() -> Any:
-    sources = SOURCES
+    sources = MEASURES
 
     @entry
     def clip_actions(rows, clipped):

@@ -107,7 +107,7 @@ class Observations:
             if not self._checked:
                 check_written(task, "guide", task.guide_bounds, guide)
         self._checked = True
-        rows = split(table, self._low, self._high, desired, joins)
+        rows = split(table, self._low, self._high, desired, joins, self._runner.reward.measure)
         # one row per world, as users expect
         observation = {
             "observation": rows.observation,

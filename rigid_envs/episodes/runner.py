@@ -17,7 +17,6 @@ from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms
 from rigid_envs.tasks import Task
-from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS
 
 Array = np.ndarray
@@ -358,7 +357,7 @@ class Runner:
 
     def compute_terminated(self, achieved: Array, desired: Array) -> Any:
         """Whether [...] a step with these goals [..., goal] terminates the episode."""
-        success = self.reward.success(distance(achieved, desired))
+        success = self.reward.success(self.reward.distance(achieved, desired))
         terminated = np.logical_and(success, self.terminate_on_success)
         return terminated if terminated.ndim else bool(terminated)
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.rotation import rotation_matrix
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.primitives import balls, primitives
 from rigid_envs.rendering.rays.intersections import BOX, CAPSULE
@@ -54,7 +55,7 @@ def overlay(
     ghosts = [marker for marker in markers if isinstance(marker, Ghost)]
     if ghosts:
         glass.append(_places(ghosts))
-        corners = [box_corners(ghost.position, ghost.half_extents) for ghost in ghosts]
+        corners = [box_corners(ghost) for ghost in ghosts]
         lines = np.array(corners)[:, EDGES].reshape(-1, 2, 3)
         colors = np.repeat([ghost.color for ghost in ghosts], len(EDGES), axis=0)
         polygons.append(_strips(lines, colors, camera, width, height))
@@ -84,9 +85,10 @@ def stacked(overlays: Sequence[Overlay], worlds: int) -> Overlay:
 _NONE = np.zeros(0, POLYGON)
 
 
-def box_corners(centre: Array, half: Array) -> Array:
-    """Corners [8, 3] of an upright box: its centre and half extents [3]."""
-    return np.asarray(centre + _SIGNS * half)
+def box_corners(ghost: Ghost) -> Array:
+    """Corners [8, 3] m of a place."""
+    turn = rotation_matrix(ghost.orientation)
+    return np.asarray(ghost.position + (_SIGNS * ghost.half_extents) @ turn.T)
 
 
 def _ball(goal: Goal, camera: Camera, floor: float) -> list[Array]:
@@ -123,6 +125,7 @@ def _places(ghosts: list[Ghost]) -> Array:
     table = primitives(len(ghosts), BOX)
     table["position"] = [ghost.position for ghost in ghosts]
     table["size"] = [ghost.half_extents for ghost in ghosts]
+    table["axes"] = [rotation_matrix(ghost.orientation).T for ghost in ghosts]
     table["reach"] = np.linalg.norm(table["size"], axis=1)
     table["color"], table["opacity"] = [ghost.color for ghost in ghosts], GHOST_OPACITY
     return table

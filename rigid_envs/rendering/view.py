@@ -1,6 +1,6 @@
 """What a picture shows: solids, what marks a goal, and forces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -84,14 +84,18 @@ class Ghost:
         half_extents: (3,) m.
         position: (3,) m, of its centre.
         color: red, green, blue in 0..255.
+        orientation: (4,) quaternion x, y, z, w.
     """
 
     half_extents: Array
     position: Array
     color: Color = GOAL_COLOR
+    orientation: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
-        """Checks extents and position."""
+        """Checks extents and pose."""
+        turn = unit_quaternion("Ghost.orientation", self.orientation)
+        object.__setattr__(self, "orientation", np.array(turn))
         extents = vector("Ghost.half_extents", self.half_extents)
         object.__setattr__(self, "half_extents", np.array(extents))
         object.__setattr__(self, "position", np.array(vector("Ghost.position", self.position)))

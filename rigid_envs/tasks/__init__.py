@@ -1,6 +1,7 @@
 """The tasks, one per file: initial state, actions, observation, goal and reward terms in NumPy."""
 
 from rigid_envs.tasks.push import Push
+from rigid_envs.tasks.push_t import PushT
 from rigid_envs.tasks.reach import Reach
 from rigid_envs.tasks.slide import Slide
 from rigid_envs.tasks.stack import Stack
@@ -9,10 +10,11 @@ from rigid_envs.tasks.throw import Throw
 
 TASKS: dict[str, type[Task]] = {
     "push": Push,
+    "push_t": PushT,
     "reach": Reach,
     "slide": Slide,
     "stack": Stack,
     "throw": Throw,
 }
 
-__all__ = ["TASKS", "Push", "Reach", "Slide", "Stack", "Task", "Throw"]
+__all__ = ["TASKS", "Push", "PushT", "Reach", "Slide", "Stack", "Task", "Throw"]

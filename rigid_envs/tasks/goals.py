@@ -1,24 +1,32 @@
 """Distance between goals.
 
-A goal is a row of points with three components each. If the number of components is not a multiple
-of three, the last point has fewer. The distance between two goals is the largest of the distances
-between their corresponding points.
+A `Measure` is a stage that computes it from columns. `points` is the one of most tasks: a goal is a
+row of points with three components each. If the number of components is not a multiple of three,
+the last point has fewer. The distance between two goals is the largest of the distances between
+their corresponding points.
 """
 
 import math
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
+from physics.compiler.code_cache import SOURCES, hash_sources
 from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
+Measure = Callable[[Array, Array, int], float]
+"""A stage: the distance between the goals a[:, i] and b[:, i]."""
+
+# kernels with a measure are compiled again after an edit of a task
+MEASURES = SOURCES ^ hash_sources(Path(__file__).parent)
 
 
 @stage
-def goal_distance(a, b, i):
+def points(a, b, i):
     """Distance in m between the goals a[:, i] and b[:, i]."""
     largest, n = 0.0, a.shape[0]
     for point in range(0, n, 3):
@@ -32,20 +40,20 @@ def goal_distance(a, b, i):
 
 
 @cache
-def _make_distances() -> Any:
-    sources = SOURCES
+def _make_distances(measure: Measure) -> Any:
+    sources = MEASURES
 
     @entry
     def distances(a, b, out):
         _ = sources
         for i in range(out.shape[0]):
-            out[i] = goal_distance(a, b, i)
+            out[i] = measure(a, b, i)
 
     return distances
 
 
-def distance(a: Any, b: Any) -> Any:
-    """Distance [...] m between goals [..., n]; between points if n is 3. Leading axes broadcast."""
+def distance(a: Any, b: Any, measure: Measure = points) -> Any:
+    """Distance [...] between goals [..., n]; by default in m. Leading axes broadcast."""
     a, b = np.asarray(a), np.asarray(b)
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)
@@ -53,5 +61,5 @@ def distance(a: Any, b: Any) -> Any:
     rows_a, rows_b = (a, b) if a.ndim == 2 else (a.reshape(-1, n), b.reshape(-1, n))
     out = np.empty(len(rows_a))
     columns_a = np.ascontiguousarray(rows_a.T, dtype=np.float64)
-    _make_distances()(columns_a, np.ascontiguousarray(rows_b.T, dtype=np.float64), out)
+    _make_distances(measure)(columns_a, np.ascontiguousarray(rows_b.T, dtype=np.float64), out)
     return out if a.ndim == 2 else out.reshape(a.shape[:-1])[()]

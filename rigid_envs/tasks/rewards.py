@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_envs.tasks.goals import distance
+from rigid_envs.tasks.goals import Measure, distance, points
 
 Array = np.ndarray
 
@@ -23,22 +23,29 @@ class Reward:
 
     Sparse: 0 where the goal distance is at most the threshold, else -1.
     Dense: the sum of weight times raw term. Three terms exist in every task: "success", 1 where the
-    task is solved; "distance", minus the goal distance in m; and "time", always 1. The task
+    task is solved; "distance", minus the goal distance; and "time", always 1. The task
     computes the others.
 
     Args:
-        threshold: largest goal distance in m at which the task counts as solved.
+        threshold: largest goal distance at which the task counts as solved, in m with the default
+            measure.
         weights: weight of each raw term of the dense reward, by name.
         time_penalty: subtracted from the dense reward in each step if success terminates the
             episode. It must be at least what the other terms can pay in one step before success:
             otherwise, delaying success would pay. It is not used if episodes continue after
             success: there it would only add a constant, which the value function would have to
             learn.
+        measure: of the goal distance; by default the distance of points in m.
     """
 
     threshold: float
     weights: Mapping[str, float]
     time_penalty: float = 0.0
+    measure: Measure = points
+
+    def distance(self, achieved: Any, desired: Any) -> Any:
+        """The goal distance [...] of goals [..., goal]."""
+        return distance(achieved, desired, self.measure)
 
     def with_time_penalty(self) -> "Reward":
         """The reward to use if success terminates the episode."""
@@ -48,7 +55,7 @@ class Reward:
         return replace(self, weights={**self.weights, "time": time}, time_penalty=0.0)
 
     def success(self, goal_distance: Any) -> Any:
-        """Whether [...] the task is solved at these goal distances [...] in m."""
+        """Whether [...] the task is solved at these goal distances [...]."""
         return goal_distance <= self.threshold
 
     def sparse(self, success: Any) -> Any:
@@ -92,7 +99,7 @@ class Reward:
                 f"achieved_goal and desired_goal must have the same shape, got {achieved.shape} "
                 f"and {desired.shape}"
             )
-        goal_distance = np.asarray(distance(achieved, desired))
+        goal_distance = np.asarray(self.distance(achieved, desired))
         success = self.success(goal_distance)
         if reward_type == "sparse":
             reward = self.sparse(success)

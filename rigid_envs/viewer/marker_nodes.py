@@ -13,6 +13,7 @@ Array = np.ndarray
 
 DISC_OPACITY, GHOST_OPACITY = 0.35, 0.22
 DISC_HEIGHT = 0.001  # m
+_UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])  # quaternion x, y, z, w
 ARM = 0.25  # width of a cross's arm over half its length
 EDGES = (0, 1, 0, 2, 0, 4, 1, 3, 1, 5, 2, 3, 2, 6, 3, 7, 4, 5, 4, 6, 5, 7, 6, 7)
 """Pairs of `box_corners`."""
@@ -67,10 +68,11 @@ class MarkerNodes:
         edges, colors = [], []
         for marker, place in markers:
             for kind, position, size in _parts(marker):
-                row = np.concatenate([position + place, size])
+                turn = marker.orientation if isinstance(marker, Ghost) else _UPRIGHT
+                row = np.concatenate([position + place, size, np.roll(turn, 1)])
                 found.setdefault((kind, marker.color), []).append(row)
             if isinstance(marker, Ghost):
-                corners = box_corners(marker.position + place, marker.half_extents)
+                corners = box_corners(marker) + place
                 edges.append(corners[list(EDGES)].reshape(-1, 2, 3))
                 colors.append(np.broadcast_to(np.array(marker.color), (len(EDGES) // 2, 2, 3)))
         for key in [key for key in self._nodes if key not in found]:
@@ -80,13 +82,14 @@ class MarkerNodes:
         self._show_edges(edges, colors)
 
     def _show(self, key: tuple[str, Color], rows: Array) -> None:
-        """Shows markers of a kind and colour at rows [n, 6] m of position and size."""
+        """Shows markers of a kind and colour at rows [n, 10] of position, size and w, x, y, z."""
         old = self._nodes.get(key)
         if old is not None and np.array_equal(old[0], rows):
             return
         if old is not None and len(old[0]) == len(rows):
             node = old[1]
-            node.batched_positions, node.batched_scales = rows[:, :3], rows[:, 3:]
+            node.batched_positions, node.batched_scales = rows[:, :3], rows[:, 3:6]
+            node.batched_wxyzs = rows[:, 6:]
         else:
             if old is not None:
                 old[1].remove()
@@ -96,9 +99,9 @@ class MarkerNodes:
                 f"/{name} {color}",
                 kind.mesh.vertices,
                 kind.mesh.faces,
-                np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)),
+                rows[:, 6:],
                 rows[:, :3],
-                batched_scales=rows[:, 3:],
+                batched_scales=rows[:, 3:6],
                 batched_colors=color,
                 opacity=kind.opacity,
                 lod="off",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from physics.scene.validation import array, number
-from rigid_envs.tasks.goals import distance
+from rigid_envs.tasks.goals import Measure, distance, points
 from rigid_envs.wrappers.rule import Goals, Observation, Rule, Terms, Transition
 
 Array = np.ndarray
@@ -67,6 +67,12 @@ class PotentialShaping(Rule):
         return reward + terms["shaping"], {}
 
 
-def goal_potential(observation: Observation) -> Array:
-    """A potential for every task: minus the goal distance [...] in m."""
-    return -np.asarray(distance(observation["achieved_goal"], observation["desired_goal"]))
+def goal_potential(observation: Observation, measure: Measure = points) -> Array:
+    """A potential: minus the goal distance [...].
+
+    Args:
+        observation: {key: [..., k]}.
+        measure: the task's `Reward.measure`; by default the distance of points in m.
+    """
+    achieved, desired = observation["achieved_goal"], observation["desired_goal"]
+    return -np.asarray(distance(achieved, desired, measure))

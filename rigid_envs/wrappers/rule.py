@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
@@ -35,12 +34,13 @@ class Goals:
     reward: Reward | None
 
     def distance(self) -> Array:
-        """Goal distance [...] in m."""
-        return np.asarray(distance(self.achieved, self.desired))
+        """Goal distance [...]."""
+        assert self.reward is not None  # only rules with `needs_success` call this
+        return np.asarray(self.reward.distance(self.achieved, self.desired))
 
     def success(self) -> Array:
         """Whether [...] the task is solved."""
-        assert self.reward is not None  # only rules with `needs_success` call this
+        assert self.reward is not None
         return np.asarray(self.reward.success(self.distance()))
 
 

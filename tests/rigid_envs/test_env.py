@@ -31,8 +31,6 @@ from tests.rigid_envs.rollout import (
 )
 
 ACTIONS = random_actions(EPISODE, 1)[:, 0]
-# for the tasks with a hand
-HAND_ACTIONS = random_actions(EPISODE, 1, size=4)[:, 0]
 ZERO = np.zeros(3, dtype=np.float32)
 
 
@@ -167,7 +165,7 @@ def rollout(env, actions=ACTIONS):
 def in_mid_episode(env_id, env=None):
     """An environment in the middle of an episode, and actions for the rest of it."""
     env = env or make(env_id)
-    actions = ACTIONS if env.action_space.shape == (3,) else HAND_ACTIONS
+    actions = random_actions(EPISODE, 1, size=env.action_space.shape[0])[:, 0]
     env.reset(seed=0)
     rollout(env, actions[:20])
     return env, actions[20:]

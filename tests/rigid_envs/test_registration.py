@@ -9,11 +9,11 @@ import pytest
 
 import rigid_envs
 from rigid_envs import RigidEnv, RigidVectorEnv, Runner
-from rigid_envs.registration import register
+from rigid_envs.registration import NAMES, register
 from rigid_envs.tasks import TASKS, Push
 from tests.rigid_envs.rollout import DENSE_IDS, IDS, PUSH, STACK, assert_same, make, make_vec
 
-STEPS = {"push": 50, "reach": 25, "slide": 50, "stack": 100, "throw": 50}
+STEPS = {"push": 50, "push_t": 100, "reach": 25, "slide": 50, "stack": 100, "throw": 50}
 
 
 def steps_of_an_episode(env, limit=250):
@@ -78,9 +78,9 @@ def test_a_dense_id_is_the_sparse_id_with_the_dense_reward(sparse_id, dense_id):
     assert gym.spec(dense_id).max_episode_steps == gym.spec(sparse_id).max_episode_steps
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_an_episode_has_the_length_of_its_task_however_it_is_made(task):
-    env_id, steps = f"RigidEnvs/{task.capitalize()}-v0", STEPS[task]
+@pytest.mark.parametrize(("name", "task"), NAMES.items())
+def test_an_episode_has_the_length_of_its_task_however_it_is_made(name, task):
+    env_id, steps = f"RigidEnvs/{name}-v0", STEPS[task]
     assert TASKS[task].max_episode_steps == gym.spec(env_id).max_episode_steps == steps
     assert steps_of_an_episode(RigidEnv(task)) == steps
     assert steps_of_an_episode(RigidEnv(TASKS[task]())) == steps

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from training.scripted.push import push
+from training.scripted.push_t import push_t
 from training.scripted.reach import reach
 from training.scripted.slide import slide
 from training.scripted.stack import stack
@@ -23,6 +24,7 @@ Controller = Callable[[dict[str, Array]], Array]
 
 CONTROLLERS: dict[str, Controller] = {
     "push": push,
+    "push_t": push_t,
     "reach": reach,
     "slide": slide,
     "stack": stack,

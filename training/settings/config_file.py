@@ -20,7 +20,8 @@ from training.settings.errors import UsageError, check_exists, nearest
 CONFIG_FOLDER = data_folder("configs", "configs")
 """The packaged settings."""
 SECTIONS = (
-    "eval_env_kwargs", "target_success_rate", "finetune_timesteps", "finetune_env_kwargs",
+    "eval_env_kwargs", "eval_freq", "target_success_rate", "finetune_timesteps",
+    "finetune_env_kwargs",
 )  # fmt: skip
 """This project's own settings that may be top-level sections of a file."""
 

@@ -20,7 +20,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.cameras import following
 from rigid_envs.rendering.renderer import grid
 from rigid_envs.rendering.view import BODY_COLORS, Mark
-from rigid_envs.tasks import Push, Reach, Slide, Stack, Throw
+from rigid_envs.tasks import Push, PushT, Reach, Slide, Stack, Throw
 from tests.rigid_envs.rollout import (
     IDS,
     PUSH,
@@ -183,7 +183,7 @@ def test_one_world_and_many_draw_alike(env_id, option):
 
 
 @pytest.mark.parametrize(
-    "task", [Push(), Reach(), Slide(), Stack(5), Throw()], ids=lambda t: type(t).__name__
+    "task", [Push(), PushT(), Reach(), Slide(), Stack(5), Throw()], ids=lambda t: type(t).__name__
 )
 def test_the_camera_sees_the_whole_task(task):
     world = World(task.scene())
@@ -191,11 +191,10 @@ def test_the_camera_sees_the_whole_task(task):
     points = []
     for row in draws:
         goal = task.start(world, np.ones(1, dtype=bool), row[None])[0]
-        points += [
-            *world.position[0],
-            *world.drive_position[0],
-            *goal[: len(goal) // 3 * 3].reshape(-1, 3),
-        ]
+        places = goal[[unit == "m" for _, unit, *_ in task.goal_bounds]]
+        if len(places) == 2:  # a pose in the plane
+            places = np.append(places, 0.0)
+        points += [*world.position[0], *world.drive_position[0], *places.reshape(-1, 3)]
     pixels, _ = task.camera.project(np.array(points), 480, 480)
     assert pixels.min() > 10
     assert pixels.max() < 470
@@ -206,12 +205,13 @@ def test_the_camera_sees_the_whole_task(task):
     [
         # as high as where it starts; a picture of all that it can reach would be mostly floor
         (Push(), Push.finger.low, (*Push.finger.high[:2], Push.finger.home[2])),
+        (PushT(), PushT.finger.low, PushT.finger.high),
         (Reach(), Reach.finger.low, Reach.finger.high),
         (Slide(), Slide.finger.low, (*Slide.finger.high[:2], Slide.finger.home[2])),
         (Stack(), Stack.hand.low, Stack.hand.high),
         (Throw(), Throw.hand.low, Throw.hand.high),
     ],
-    ids=["Push", "Reach", "Slide", "Stack", "Throw"],
+    ids=["Push", "PushT", "Reach", "Slide", "Stack", "Throw"],
 )
 def test_the_camera_sees_the_tool_wherever_it_goes(task, low, high):
     places = np.array(list(itertools.product(*zip(low, high, strict=True))))

@@ -224,6 +224,27 @@ def test_a_ghost_tints_its_place_and_shows_its_edges_through_a_solid():
     assert shows(alone, pixel_of(corner), RED)
 
 
+def test_a_ghost_is_turned():
+    """By 45 degrees about the vertical: its corners are where an upright one has no edges."""
+    half = np.pi / 8.0
+    turned = draw(
+        markers=[
+            Ghost(
+                CUBE.half_extents,
+                (0.0, 0.0, 0.02),
+                GREEN,
+                orientation=(0.0, 0.0, np.sin(half), np.cos(half)),
+            )
+        ]
+    )
+    upright = draw(markers=[Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), GREEN)])
+    corner = pixel_of((np.sqrt(2.0) * 0.02, 0.0, 0.04))
+    assert shows(turned, corner, GREEN)
+    assert not shows(upright, corner, GREEN)
+    with pytest.raises(ValueError, match=r"Ghost\.orientation"):
+        Ghost(CUBE.half_extents, (0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0, 0.0))
+
+
 def test_a_cube_in_its_place_keeps_its_colour():
     place, cube = Ghost(CUBE.half_extents, (0.0, 0.0, 0.02), RED), item(CUBE, (0.0, 0.0, 0.02))
     pixel = pixel_of((0.0, 0.0, 0.04))
