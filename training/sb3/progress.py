@@ -4,6 +4,7 @@ import time
 from typing import Any
 
 import numpy as np
+import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
@@ -86,6 +87,9 @@ class TrainingProgress(BaseCallback):
 class StopAtSuccess(BaseCallback):
     """Ends training when the success of the mean action reaches the target in an evaluation.
 
+    Stable-Baselines3 updates the policy once more before it stops. The policy that was evaluated is
+    kept: an update can change its success by several percent.
+
     Args:
         target: Fraction of the episodes.
         evaluation: The evaluations.
@@ -100,6 +104,7 @@ class StopAtSuccess(BaseCallback):
         self.target, self.evaluation = target, evaluation
         self.finetuning = finetuning
         self.reached = False
+        self._evaluated: dict[str, torch.Tensor] = {}
 
     def _on_rollout_end(self) -> None:
         if self.evaluation.at_step != self.num_timesteps:
@@ -107,12 +112,18 @@ class StopAtSuccess(BaseCallback):
         reached = self.evaluation.rate >= self.target
         if self.finetuning is None or self.finetuning.started:
             self.reached = reached
+            if reached:
+                weights = self.model.policy.state_dict()
+                self._evaluated = {name: value.clone() for name, value in weights.items()}
         elif reached:
             self.finetuning.from_steps = 0
 
     def _on_step(self) -> bool:
-        # one step later than reached, so that the update with the last rollout takes place
         return not self.reached
+
+    def _on_training_end(self) -> None:
+        if self.reached:
+            self.model.policy.load_state_dict(self._evaluated)
 
 
 def success_rate(model: Any) -> float | None:

@@ -64,6 +64,20 @@ def test_training_ends_when_an_evaluation_reaches_the_target(quick_ppo, tmp_path
     assert max(reached[:-1], default=0.0) < 0.01
 
 
+def test_a_run_that_reaches_its_target_keeps_the_policy_that_was_evaluated(quick_ppo, tmp_path):
+    config = quick_ppo.replace(
+        n_timesteps=100_000, learning_rate=3e-2, n_epochs=4,
+        target_success_rate=0.01, eval_freq=80, n_eval_episodes=100,
+    )  # fmt: skip
+    result = train(config, tmp_path, quiet=True)
+    evaluations = (result.steps - config.n_envs) // config.eval_freq  # training ends a step later
+    envs = make_vector_env(config.env_id, 100, **config.env_kwargs)
+    policy = trained_policy(result.folder.path)
+    played = play_episodes(envs, policy.act, FIRST_SEED + evaluations * 100)
+    rates = [row[EVALUATED] for row in read_learning_curve(result.folder) if EVALUATED in row]
+    assert played.success_at_end.mean() == rates[-1] > 0.0
+
+
 def test_a_resumed_run_evaluates_other_episodes_than_before(quick_ppo, tmp_path, monkeypatch):
     from training.sb3 import evaluation
 
