@@ -46,6 +46,11 @@ def add_training(parser: argparse.ArgumentParser) -> None:
         help="settings that replace those of the file, as in n_epochs:4 gamma:0.95",
     )
     parser.add_argument(
+        "--demonstrations",
+        metavar="DATASET",
+        help="Minari dataset from which SAC samples a part of each batch; see rigid-envs dataset",
+    )
+    parser.add_argument(
         "--num-threads", type=count, default=1, help="number of torch threads (default: 1)"
     )
     add_folder(parser)

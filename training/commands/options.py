@@ -53,6 +53,13 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
     for name in ("n_timesteps", "n_envs", "seed"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
+    if options.demonstrations is not None:
+        if config.algo != "sac":
+            raise UsageError(
+                f"--demonstrations is {options.demonstrations!r}, but {config.algo} learns from "
+                "its own steps only: add --algo sac"
+            )
+        changes["demonstrations"] = options.demonstrations
     env_kwargs = env_kwargs_of(options)
     if env_kwargs:
         changes["env_kwargs"] = {**config.env_kwargs, **env_kwargs}

@@ -28,17 +28,12 @@ from training.settings.settings import (
     number,
     optional,
     setting,
+    text,
 )
 
 RESULT = "result.json"
 SAME_TASK = ("reward_type", "fidelity", "observe_task_guide")
 """Arguments of the environment that do not change the task to be solved."""
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str) or not value:
-        raise InvalidValue("text")
-    return value
 
 
 def _rate(value: Any) -> dict[str, float]:
@@ -57,7 +52,7 @@ class Result:
 
     algorithm: str = setting(choice("ppo", "sac"))
     """Name of the algorithm."""
-    env_id: str = setting(_text)
+    env_id: str = setting(text)
     """Environment id, with its version."""
     arguments: dict[str, Any] = setting(mapping())
     """Arguments of the environment at the end of training and in the evaluation."""
@@ -73,19 +68,19 @@ class Result:
     """Number of episodes of the evaluation."""
     first_seed: int = setting(integer(0))
     """Seed of the first of these episodes."""
-    fidelity: str | None = setting(optional(_text))
+    fidelity: str | None = setting(optional(text))
     """Fidelity preset of these episodes; None for the default of the environment."""
     success_at_end: dict[str, float] = setting(_rate)
     """Fraction of the episodes that ended in success: low, rate, high (95 % Wilson interval)."""
     success_at_any_time: dict[str, float] = setting(_rate)
     """Fraction of the episodes that reached the goal after any step, likewise."""
-    command: str = setting(_text)
+    command: str = setting(text)
     """Command that repeats the training, with the code of `commit`."""
-    commit: str | None = setting(optional(_text))
+    commit: str | None = setting(optional(text))
     """Git commit of the training code, if known."""
     resumed: int = setting(integer(0))
     """Number of times that the run was resumed."""
-    started: str = setting(_text)
+    started: str = setting(text)
     """Start of training, in UTC."""
     versions: dict[str, Any] = setting(mapping())
     """Versions of Python, platform and packages in training."""

@@ -12,8 +12,10 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from stable_baselines3.her import HerReplayBuffer
 
+from training.datasets.demonstrations import read_demonstrations
 from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import OffsetPolicy
+from training.sb3.demonstration_buffers import DemonstrationBuffer, DemonstrationHerBuffer
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.config import (
     BOUNDED_POLICY,
@@ -117,9 +119,21 @@ def _model(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
         gradient_steps=config.gradient_steps,
         tau=config.tau,
         ent_coef=config.ent_coef,
-        replay_buffer_class=HerReplayBuffer if config.replay_buffer_class else None,
-        replay_buffer_kwargs=dict(config.replay_buffer_kwargs),
+        **_replay_buffer(config),
     )
+
+
+def _replay_buffer(config: SACConfig) -> dict[str, Any]:
+    """The arguments of SAC for its replay buffer."""
+    hindsight = config.replay_buffer_class is not None
+    keywords = dict(config.replay_buffer_kwargs)
+    if config.demonstrations is None:
+        kind: Any = HerReplayBuffer if hindsight else None
+    else:
+        kind = DemonstrationHerBuffer if hindsight else DemonstrationBuffer
+        keywords["episodes"] = read_demonstrations(config)
+        keywords["fraction"] = config.demonstration_fraction
+    return {"replay_buffer_class": kind, "replay_buffer_kwargs": keywords}
 
 
 def _schedule(value: float | str) -> float | LinearSchedule:

@@ -25,6 +25,7 @@ from training.settings.settings import (
     parse_wrappers,
     schedule,
     setting,
+    text,
     wrapper_list,
 )
 
@@ -260,9 +261,23 @@ class SACConfig(TrainConfig):
     """HerReplayBuffer for hindsight experience replay; null for an ordinary replay buffer."""
     replay_buffer_kwargs: dict[str, Any] = setting(mapping(HER_RULES), {})
     """Arguments of HerReplayBuffer: n_sampled_goal, goal_selection_strategy."""
+    demonstrations: str | None = setting(optional(text), None)
+    """Name of a Minari dataset of the environment; null for no demonstrations."""
+    demonstration_fraction: float = setting(number(above=0, at_most=0.9), 0.5)
+    """Part of each batch that is sampled from the demonstrations."""
+
+    @property
+    def demonstration_batch(self) -> int:
+        """Transitions of a batch that are sampled from the demonstrations."""
+        return round(self.demonstration_fraction * self.batch_size)
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
+        if self.demonstrations is not None and self.env_wrapper is not None:
+            raise UsageError(
+                f"{where}: env_wrapper cannot be used with demonstrations, whose rewards are those "
+                "of the environment alone"
+            )
         if self.replay_buffer_class is None:
             if self.replay_buffer_kwargs:
                 raise UsageError(

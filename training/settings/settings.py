@@ -93,6 +93,13 @@ def boolean(value: Any) -> bool:
     return value
 
 
+def text(value: Any) -> str:
+    """Text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise InvalidValue("text")
+    return value
+
+
 def choice(*options: str) -> Rule:
     """One of the options."""
 

@@ -1,0 +1,90 @@
+"""Reads the episodes of a Minari dataset as demonstrations for training."""
+
+import importlib.util
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+
+from training.datasets.record import Recorded
+from training.settings.config import SACConfig
+from training.settings.environment_ids import plain_id
+from training.settings.environments import make_single_env
+from training.settings.errors import UsageError
+
+Array = np.ndarray
+
+
+def read_demonstrations(config: SACConfig) -> list[Recorded]:
+    """The episodes of the dataset that the settings name.
+
+    Args:
+        config: The settings; `demonstrations` is set.
+
+    Raises:
+        UsageError: Minari is not installed; there is no such dataset, or it is damaged; it is of
+            another environment, version or reward, or has other observations; or it has too few
+            steps.
+    """
+    name = config.demonstrations
+    if any(importlib.util.find_spec(module) is None for module in ("minari", "h5py")):
+        raise UsageError(
+            'demonstrations require minari and h5py; to install: pip install "rigid-envs[data]"'
+        )
+    import minari
+
+    try:
+        dataset = minari.load_dataset(name)
+        episodes = [_recorded(episode) for episode in dataset.iterate_episodes()]
+        spec = dataset.spec.env_spec
+    except Exception as error:  # Minari and h5py raise exceptions of many types
+        reason = " ".join(str(error).split())
+        raise UsageError(
+            f"demonstrations is {name!r}: {reason:.200}; it should be a dataset in Minari's "
+            "folder, as `rigid-envs dataset` writes it and `minari list local` shows it"
+        ) from None
+    _check(config, spec, episodes)
+    return episodes
+
+
+def _recorded(episode: Any) -> Recorded:
+    return Recorded(
+        seed=-1,
+        observations={key: np.asarray(values) for key, values in episode.observations.items()},
+        actions=np.asarray(episode.actions),
+        rewards=np.asarray(episode.rewards),
+        terminated=np.asarray(episode.terminations, dtype=bool),
+        truncated=np.asarray(episode.truncations, dtype=bool),
+        success=np.asarray(episode.infos["is_success"], dtype=bool),
+    )
+
+
+def _check(config: SACConfig, spec: Any, episodes: list[Recorded]) -> None:
+    """Raises UsageError if the demonstrations do not fit the settings."""
+    start = f"demonstrations is {config.demonstrations!r}, a dataset of"
+    env_id = spec.id if spec is not None else "an unknown environment"
+    if plain_id(env_id) != plain_id(config.env_id):
+        raise UsageError(f"{start} {env_id}; it should be of {config.env_id}")
+    with closing(make_single_env(config.env_id, **config.env_kwargs)) as env:
+        spaces: Any = env.observation_space
+        own: Any = env.spec
+    reward_type, given = (one.kwargs.get("reward_type", "sparse") for one in (own, spec))
+    if given != reward_type:
+        raise UsageError(
+            f"{start} the {given} reward; training has the {reward_type} one: record it with "
+            f"--env-kwargs reward_type:{reward_type}"
+        )
+    found = {key: values.shape[1:] for key, values in episodes[0].observations.items()}
+    wanted = {key: space.shape for key, space in spaces.items()}
+    if found != wanted:
+        raise UsageError(
+            f"{start} observations {found}; those of training are {wanted}: record it with the "
+            "same --env-kwargs"
+        )
+    steps = sum(len(episode.rewards) for episode in episodes)
+    needed = config.demonstration_batch
+    if steps < needed:
+        raise UsageError(
+            f"{start} {len(episodes)} episodes with {steps} steps in all; it should have at least "
+            f"{needed} steps, as each gradient step samples so many: record more episodes"
+        )

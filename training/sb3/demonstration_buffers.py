@@ -1,0 +1,106 @@
+"""Replay buffers that take a part of every batch from demonstrations.
+
+So the critic sees success from the first gradient step on, although the policy has none yet (Ball
+et al., Efficient online reinforcement learning with offline data, ICML 2023). Demonstrations are
+never overwritten; with HER, their goals are replaced as those of other episodes.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from stable_baselines3.common.buffers import DictReplayBuffer
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.her import HerReplayBuffer
+
+from training.datasets.record import Recorded
+
+
+class DemonstrationBuffer(DictReplayBuffer):
+    """A replay buffer with demonstrations.
+
+    Args:
+        *arguments, **keywords: Those of DictReplayBuffer.
+        episodes: The demonstrations.
+        fraction: Part of each batch that is sampled from them.
+    """
+
+    def __init__(
+        self, *arguments: Any, episodes: Sequence[Recorded], fraction: float, **keywords: Any
+    ):
+        super().__init__(*arguments, **keywords)
+        self.fraction = fraction
+        self.demonstrations = DictReplayBuffer(
+            _steps(episodes), self.observation_space, self.action_space, self.device
+        )
+        _fill(self.demonstrations, episodes)
+
+    def sample(  # type: ignore[override]
+        self, batch_size: int, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        """A batch of which a part is from demonstrations."""
+        shown = round(self.fraction * batch_size)
+        own = super().sample(batch_size - shown, env)
+        return _joined(own, self.demonstrations.sample(shown, env))
+
+
+class DemonstrationHerBuffer(HerReplayBuffer):
+    """The same with hindsight experience replay.
+
+    Args:
+        *arguments, **keywords: Those of HerReplayBuffer.
+        episodes: The demonstrations.
+        fraction: Part of each batch that is sampled from them.
+    """
+
+    def __init__(
+        self, *arguments: Any, episodes: Sequence[Recorded], fraction: float, **keywords: Any
+    ):
+        super().__init__(*arguments, **keywords)
+        self.fraction = fraction
+        assert self.env is not None
+        self.demonstrations = HerReplayBuffer(
+            _steps(episodes), self.observation_space, self.action_space, self.env, self.device,
+            n_sampled_goal=self.n_sampled_goal,
+            goal_selection_strategy=self.goal_selection_strategy,
+        )  # fmt: skip
+        _fill(self.demonstrations, episodes)
+
+    def sample(  # type: ignore[override]
+        self, batch_size: int, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        """A batch of which a part is from demonstrations."""
+        shown = round(self.fraction * batch_size)
+        own = super().sample(batch_size - shown, env)
+        return _joined(own, self.demonstrations.sample(shown, env))
+
+
+def _steps(episodes: Sequence[Recorded]) -> int:
+    return sum(len(episode.rewards) for episode in episodes)
+
+
+def _fill(buffer: DictReplayBuffer, episodes: Sequence[Recorded]) -> None:
+    for episode in episodes:
+        seen = episode.observations
+        for t in range(len(episode.rewards)):
+            before, after = (
+                {key: values[None, k] for key, values in seen.items()} for k in (t, t + 1)
+            )
+            done = episode.terminated[t] | episode.truncated[t]
+            cut = bool(episode.truncated[t] and not episode.terminated[t])
+            buffer.add(
+                before, after, episode.actions[None, t], episode.rewards[None, t], done[None],
+                [{"TimeLimit.truncated": cut}],
+            )  # fmt: skip
+
+
+def _joined(
+    own: DictReplayBufferSamples, shown: DictReplayBufferSamples
+) -> DictReplayBufferSamples:
+    def both(a: Any, b: Any) -> Any:
+        if isinstance(a, dict):
+            return {key: torch.cat([a[key], b[key]]) for key in a}
+        return None if a is None else torch.cat([a, b])
+
+    return DictReplayBufferSamples(*map(both, own, shown))
