@@ -1,4 +1,4 @@
-"""Demonstrations: read from a dataset, sampled in every batch, and refused where they do not fit."""
+"""Demonstrations: read from a dataset, sampled in every batch; an error where they do not fit."""
 
 import numpy as np
 import pytest
