@@ -42,7 +42,7 @@ class Slide(Task):
     draw_count = 4  # x and y of the puck; distance and angle of the goal
     # a larger puck could touch the finger at home
     size_range = (0.0, 2.0)
-    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 3.0, "reach": 1.0})
+    reward = Reward(THRESHOLD, {"success": 1.0, "aim": 10.0, "reach": 1.0})
 
     def scene(self) -> Scene:
         """A puck on slippery ground, and a finger behind it."""
