@@ -348,6 +348,7 @@ def add_tuning(parser: argparse.ArgumentParser) -> None:
         "--storage",
         help="SQLite file or database URL (default: <environment>_tuning.db in the folder of runs)",
     )
+    add_ray(parser)
     parser.add_argument(
         "--study-name", help="name of the study in the database (default: <algo>-<environment>)"
     )

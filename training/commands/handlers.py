@@ -248,6 +248,8 @@ def dataset(options: argparse.Namespace) -> int:
 
 def tune(options: argparse.Namespace) -> int:
     """Searches settings and prints the best ones as YAML."""
+    if options.ray is not None:
+        require("ray", RAY_EXTRA)
     config = config_of(options)
 
     from training.commands import tuning
@@ -276,6 +278,7 @@ def tune(options: argparse.Namespace) -> int:
         study_name=options.study_name,
         device=options.device,
         num_threads=options.num_threads,
+        ray=options.ray,
     )
     if best.settings is not None:
         print(f"# {best.summary}")
