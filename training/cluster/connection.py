@@ -19,6 +19,10 @@ EXPECTED = (
     "cluster of this machine, or nothing for that or a new one"
 )
 
+ACCESS = (
+    "a cluster with token authentication also needs RAY_AUTH_MODE=token and its ~/.ray/auth_token"
+)
+
 
 @dataclass(frozen=True)
 class Demand:
@@ -89,7 +93,7 @@ def connected(address: str) -> Iterator[None]:
         )  # fmt: skip
     except Exception as error:  # Ray has no common type of these errors
         reason = " ".join(str(error).split())
-        raise UsageError(f"--ray is {address!r}: {reason:.300}; it {EXPECTED}") from None
+        raise UsageError(f"--ray is {address!r}: {reason:.300}; it {EXPECTED}; {ACCESS}") from None
     try:
         yield
     finally:

@@ -40,10 +40,9 @@ def states(tmp_path) -> list[TrialState]:
     return [trial.state for trial in study_of(tmp_path).trials]
 
 
-def test_trials_on_two_nodes_join_the_study_of_local_ones(two_nodes, words, tmp_path, capsys):
+def test_trials_on_two_nodes_join_the_study_of_local_ones(address, words, tmp_path, capsys):
     assert cli.main([*words, "--n-trials", "1"]) == 0
     capsys.readouterr()
-    address = two_nodes[0].address
     assert cli.main([*words, "--n-trials", "4", "--ray", address]) == 0
     shown = capsys.readouterr()
     assert shown.out.startswith("# best of 4 trials: number ")
@@ -59,7 +58,9 @@ def test_trials_on_two_nodes_join_the_study_of_local_ones(two_nodes, words, tmp_
     assert capsys.readouterr().out == before
 
 
-def test_lost_diverged_and_poor_trials_are_told_apart(words, tmp_path, monkeypatch, capsys):
+def test_lost_diverged_and_poor_trials_are_told_apart(
+    address, words, tmp_path, monkeypatch, capsys
+):
     run_trial = trials_module.run_trial
 
     def ending(order, driver):
@@ -74,7 +75,7 @@ def test_lost_diverged_and_poor_trials_are_told_apart(words, tmp_path, monkeypat
         return run_trial(order, driver)
 
     monkeypatch.setattr(trials_module, "run_trial", ending)
-    assert cli.main([*words, "--n-trials", "3", "--ray"]) == 0
+    assert cli.main([*words, "--n-trials", "3", "--ray", address]) == 0
     err = capsys.readouterr().err
     assert "trial 0: lost with its worker (WorkerCrashedError)" in err
     assert "trial 1: failed: not finite" in err
@@ -84,14 +85,16 @@ def test_lost_diverged_and_poor_trials_are_told_apart(words, tmp_path, monkeypat
     assert states(tmp_path) == done
 
 
-def test_trials_that_kill_every_worker_end_the_search(words, tmp_path, monkeypatch, capsys):
+def test_trials_that_kill_every_worker_end_the_search(
+    address, words, tmp_path, monkeypatch, capsys
+):
     def dying(order, driver):
         import os
 
         os._exit(1)
 
     monkeypatch.setattr(trials_module, "run_trial", dying)
-    assert cli.main([*words, "--n-trials", "3", "--ray"]) == 2
+    assert cli.main([*words, "--n-trials", "3", "--ray", address]) == 2
     assert "4 trials in a row lost their workers (WorkerCrashedError)" in capsys.readouterr().err
     assert TrialState.RUNNING not in states(tmp_path)
 
