@@ -1,13 +1,16 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+RAY_BIN := .venv/ray/bin
+RAY_STAMP := .venv/ray/.installed
 
-.PHONY: help demo test package stress bench check docs clean
+.PHONY: help demo test package ray stress bench check docs clean
 
 help:
 	@echo "make demo    train the pushing policy, evaluate it, film it"
 	@echo "make test    run the tests"
 	@echo "make package test the built wheel and the settings that rl-baselines3-zoo reads"
+	@echo "make ray     run the tests that need Ray, in .venv/ray"
 	@echo "make stress  run the tests in their long form, with many more random examples"
 	@echo "make bench   measure speed and accuracy, together with MuJoCo"
 	@echo "make check   lint, format, types, import rules, documentation"
@@ -30,6 +33,15 @@ test: $(STAMP)
 
 package: $(STAMP)
 	$(BIN)/python -m pytest -q -m packaging
+
+# RLlib pins another version of gymnasium, so Ray has a virtual environment of its own.
+$(RAY_STAMP): pyproject.toml constraints-ray.txt
+	$(PYTHON) -m venv .venv/ray
+	$(RAY_BIN)/python -m pip install --quiet -c constraints-ray.txt -e ".[ray,tune]" pytest hypothesis
+	@touch $@
+
+ray: $(RAY_STAMP)
+	RAY_USAGE_STATS_ENABLED=0 $(RAY_BIN)/python -m pytest -q tests/training/cluster
 
 stress: $(STAMP)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress

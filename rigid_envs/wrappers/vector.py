@@ -15,7 +15,7 @@ Array = np.ndarray
 Infos = dict[str, Any]
 
 
-class VectorRewardWrapper(RuleWrapper, VectorWrapper[Any, Any, Any, Any, Any]):
+class VectorRewardWrapper(RuleWrapper, VectorWrapper):  # generic from Gymnasium 1.3 on
     """Applies a rule to a vector environment of any autoreset mode. Subclasses set the rule.
 
     Args:

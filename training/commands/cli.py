@@ -64,14 +64,7 @@ def _parser() -> argparse.ArgumentParser:
 
     training = command("train", handlers.train, "Train a policy into a new run folder.")
     flags.add_training(training)
-    training.add_argument(
-        "--resume", type=Path, metavar="RUN", help="resume this run from its last checkpoint"
-    )
-    training.add_argument(
-        "--save-freq",
-        type=flags.count,
-        help="steps between checkpoints (default: a tenth of the run)",
-    )
+    flags.add_runs(training)
 
     evaluation = command("evaluate", handlers.evaluate, "Measure the success rate of a policy.")
     flags.add_policy(evaluation)

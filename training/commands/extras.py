@@ -19,6 +19,7 @@ TRAIN_EXTRA = (
 RENDER_EXTRA = ("pygame",)
 VIEW_EXTRA = ("viser",)
 TUNE_EXTRA = (*TRAIN_EXTRA, "optuna")
+RAY_EXTRA = (*TRAIN_EXTRA, "ray")
 DATA_EXTRA = (*TRAIN_EXTRA, "minari", "h5py")
 
 

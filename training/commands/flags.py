@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
+from training.commands.seeds import seeds
 from training.settings.errors import UsageError
 
 DEFAULT_ALGO = "ppo"
@@ -56,6 +57,32 @@ def add_training(parser: argparse.ArgumentParser) -> None:
     add_folder(parser)
     add_environment(parser)
     add_device(parser)
+
+
+def add_runs(parser: argparse.ArgumentParser) -> None:
+    """Flags of train: which runs, and their checkpoints."""
+    parser.add_argument(
+        "--seeds", type=seeds, metavar="LIST",
+        help="train one run for each of these seeds, as in 0-9 or 0-2,5",
+    )  # fmt: skip
+    add_ray(parser)
+    parser.add_argument(
+        "--resume", type=Path, metavar="RUN", help="resume this run from its last checkpoint"
+    )
+    parser.add_argument(
+        "--save-freq",
+        type=count,
+        help="steps between checkpoints (default: a tenth of the run)",
+    )
+
+
+def add_ray(parser: argparse.ArgumentParser) -> None:
+    """The flag for a Ray cluster."""
+    parser.add_argument(
+        "--ray", nargs="?", const="", metavar="ADDRESS",
+        help="work on the nodes of the Ray cluster at HOST:PORT (default: that of this machine, or "
+        "a new one); each run or trial takes --num-threads CPUs",
+    )  # fmt: skip
 
 
 def add_policy(parser: argparse.ArgumentParser) -> None:
@@ -326,6 +353,7 @@ def add_tuning(parser: argparse.ArgumentParser) -> None:
         "--storage",
         help="SQLite file or database URL (default: <environment>_tuning.db in the folder of runs)",
     )
+    add_ray(parser)
     parser.add_argument(
         "--study-name", help="name of the study in the database (default: <algo>-<environment>)"
     )

@@ -8,10 +8,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from training.commands.extras import require
+from training.commands.extras import RAY_EXTRA, require
 from training.commands.flags import DEFAULT_ENV
 from training.commands.options import (
     check_resumable,
+    check_seeds,
     config_of,
     config_of_file,
     env_kwargs_of,
@@ -25,12 +26,16 @@ INTERRUPTED = 130
 
 
 def train(options: argparse.Namespace) -> int:
-    """Trains a policy, or resumes a run."""
+    """Trains a policy, trains one for each seed, or resumes a run."""
+    check_seeds(options)
+    if options.ray is not None:
+        require("ray", RAY_EXTRA)
     # before torch is imported, so that invalid settings are reported at once
     config = config_of(options) if options.resume is None else None
     if config is None:
         check_resumable(options)
 
+    from training.commands import seeds
     from training.commands.demo import print_training
     from training.runs.run_folder import RunFolder
     from training.sb3 import train as training
@@ -40,12 +45,21 @@ def train(options: argparse.Namespace) -> int:
         "num_threads": options.num_threads,
         "save_every": options.save_freq,
     }
-    if config is None:
-        trained = training.resume(RunFolder(options.resume), **machine)
+    if options.ray is not None:
+        runs: Any = RunFolder(options.resume)
+        if config is not None:
+            runs = [config.replace(seed=seed) for seed in options.seeds or (config.seed,)]
+        interrupted = seeds.train_on_ray(runs, options.log_folder, options.ray, **machine)
+    elif config is not None and options.seeds is not None:
+        interrupted = seeds.train_seeds(config, options.seeds, options.log_folder, **machine)
     else:
-        trained = training.train(config, options.log_folder, **machine)
-    print_training(trained)
-    return INTERRUPTED if trained.interrupted else 0
+        if config is None:
+            trained = training.resume(RunFolder(options.resume), **machine)
+        else:
+            trained = training.train(config, options.log_folder, **machine)
+        print_training(trained)
+        interrupted = trained.interrupted
+    return INTERRUPTED if interrupted else 0
 
 
 def evaluate(options: argparse.Namespace) -> int:
@@ -234,6 +248,8 @@ def dataset(options: argparse.Namespace) -> int:
 
 def tune(options: argparse.Namespace) -> int:
     """Searches settings and prints the best ones as YAML."""
+    if options.ray is not None:
+        require("ray", RAY_EXTRA)
     config = config_of(options)
 
     from training.commands import tuning
@@ -262,6 +278,7 @@ def tune(options: argparse.Namespace) -> int:
         study_name=options.study_name,
         device=options.device,
         num_threads=options.num_threads,
+        ray=options.ray,
     )
     if best.settings is not None:
         print(f"# {best.summary}")

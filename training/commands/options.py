@@ -66,6 +66,20 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
     return config.replace(**changes)
 
 
+def check_seeds(options: argparse.Namespace) -> None:
+    """Raises UsageError if --seeds is given together with another choice of seeds."""
+    from training.settings.config_file import parse_settings
+
+    if options.seeds is None:
+        return
+    if options.seed is not None:
+        raise UsageError("--seed cannot be used with --seeds: omit one of them")
+    if options.resume is not None:
+        raise UsageError("--seeds cannot be used with --resume: a run keeps its seed")
+    if "seed" in parse_settings(options.hyperparams, "--hyperparams"):
+        raise UsageError("--hyperparams seed cannot be used with --seeds: omit one of them")
+
+
 def check_resumable(options: argparse.Namespace) -> None:
     """Raises UsageError if flags contradict the settings of the run to resume."""
     from training.runs.run_folder import RunFolder

@@ -6,22 +6,18 @@ interrupted search, and several processes may work on one study.
 
 import json
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import optuna
 from optuna.trial import TrialState
-from stable_baselines3.common.callbacks import BaseCallback
 
-from training.policies.trained_policy import trained_policy
-from training.results.evaluate import evaluate
 from training.results.result import task_name
+from training.results.trial import Stopped, success_of
 from training.runs.run_folder import folder_name
-from training.sb3.progress import success_rate
-from training.sb3.train import train
 from training.settings.config import TrainConfig
 from training.settings.environments import make_vector_env
 from training.settings.errors import UsageError
@@ -29,14 +25,10 @@ from training.settings.search_space import draw, with_drawn
 
 STEPS_DIVISOR = 10
 """By default a trial has this fraction, a tenth, of the steps in the settings."""
-INTERMEDIATE_REPORTS = 10
-"""Number of intervals of a trial; at the end of each but the last, it is compared with others."""
 WARMUP_REPORTS = 2
 """Number of first comparisons that do not stop a trial: early success rates mean little."""
 STARTUP_TRIALS = 5
 """Number of complete trials before any is stopped: the median of fewer trials means little."""
-FIRST_SEED = 2_000_000
-"""First seed of the evaluation, whose episodes differ from those of the recorded results."""
 SEED_LIMIT = 2**32
 """Upper bound of the sampler's seed."""
 FAILURE = "failure"
@@ -55,30 +47,6 @@ class Tuned:
     """Whether Ctrl-C ended the search."""
 
 
-class Pruning(BaseCallback):
-    """Reports intermediate success rates of a trial, and stops it if most others are better.
-
-    Args:
-        trial: The trial.
-        steps: Environment steps of the trial.
-    """
-
-    def __init__(self, trial: optuna.Trial, steps: int):
-        super().__init__()
-        self.trial = trial
-        self.steps = steps
-        self.reports = 0
-
-    def _on_step(self) -> bool:
-        due = INTERMEDIATE_REPORTS * self.num_timesteps // self.steps
-        if self.reports < due < INTERMEDIATE_REPORTS:
-            self.reports = due
-            self.trial.report(success_rate(self.model) or 0.0, due)
-            if self.trial.should_prune():
-                raise optuna.TrialPruned
-        return True
-
-
 def tune(
     config: TrainConfig,
     log_folder: Path = Path("runs"),
@@ -89,6 +57,7 @@ def tune(
     study_name: str | None = None,
     device: str = "cpu",
     num_threads: int = 1,
+    ray: str | None = None,
 ) -> Tuned:
     """Trains repeatedly with settings sampled from `search_space.SPACES`.
 
@@ -105,42 +74,114 @@ def tune(
         study_name: Name of the study in the database.
         device: Torch device of the networks.
         num_threads: Number of torch threads.
+        ray: Address of a Ray cluster that runs the trials, as many at a time as its nodes have
+            CPUs for their threads; "" for that of this machine or a new one. None runs them here,
+            one after another.
 
     Raises:
         UsageError: The environment rejects its arguments, the database cannot be used, the study
-            was started with other settings, or every trial has failed.
+            was started with other settings, there is no such cluster, or every trial has failed.
     """
     make_vector_env(config.env_id, 1, **config.env_kwargs).close()
-    study = _study(config, log_folder, storage, study_name, episodes)
-    interrupted = False
-    while not interrupted and len(_done(study)) < trials:
-        trial, start = study.ask(), time.perf_counter()
-        try:
-            value = _success(config, trial, episodes, device, num_threads)
-        except optuna.TrialPruned:
-            study.tell(trial, state=TrialState.PRUNED)
-            outcome = "stopped early"
-        except KeyboardInterrupt:
-            study.tell(trial, state=TrialState.FAIL)
-            interrupted, outcome = True, "interrupted"
-        except ValueError as error:  # not finite: raised by torch or by this project
-            trial.set_user_attr(FAILURE, str(error))
-            study.tell(trial, state=TrialState.FAIL)
-            outcome = f"failed: {' '.join(str(error).split()):.100}"
-        else:
-            study.tell(trial, value)
-            outcome = f"success {value:.1%}"
-        seconds = time.perf_counter() - start
-        print(
-            f"trial {trial.number}: {outcome} in {seconds:.0f} s; {_summary(study)}",
-            file=sys.stderr,
-        )
+    search = _Search(config, trials, episodes, device, num_threads)
+    if ray is None:
+        study = search.study = _study(config, log_folder, storage, study_name, episodes)
+        interrupted = search.run_here()
+    else:
+        from training.cluster.connection import connected
+
+        with connected(ray):
+            study = search.study = _study(config, log_folder, storage, study_name, episodes)
+            interrupted = search.run_on_cluster()
     complete = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
     if not complete and not interrupted:
         last = _done(study)[-1].user_attrs.get(FAILURE, "unknown")
         raise UsageError(f"all {trials} trials failed; the error of the last one: {last}")
     best = with_drawn(config, study.best_trial.params) if complete else None
     return Tuned(best, _summary(study), interrupted)
+
+
+class _Search:
+    """The trials of a study: asks for their settings, and tells their outcomes.
+
+    Args:
+        config: The settings that are not searched, and the steps of a trial.
+        trials: Number of trials in total.
+        episodes: Number of episodes of each evaluation.
+        device: Torch device of the networks.
+        num_threads: Number of torch threads.
+    """
+
+    study: optuna.Study
+
+    def __init__(
+        self, config: TrainConfig, trials: int, episodes: int, device: str, num_threads: int
+    ):
+        self.config, self.trials, self.episodes = config, trials, episodes
+        self.device, self.num_threads = device, num_threads
+        self.running: dict[int, tuple[optuna.Trial, float]] = {}
+
+    def run_here(self) -> bool:
+        """Runs trials one after another; returns whether Ctrl-C ended them."""
+        while (trial := self._ask()) is not None:
+            outcome: float | BaseException
+            try:
+                outcome = _success(self.config, trial, self.episodes, self.device, self.num_threads)
+            except (Stopped, KeyboardInterrupt, ValueError) as error:
+                outcome = error  # a ValueError is one of numbers that are not finite
+            self._tell(trial.number, outcome)
+            if isinstance(outcome, KeyboardInterrupt):
+                return True
+        return False
+
+    def run_on_cluster(self) -> bool:
+        """Runs trials on the Ray cluster; returns whether Ctrl-C ended them."""
+        from training.cluster.connection import Demand
+        from training.cluster.trials import TrialOrder, run_trials
+
+        def ask() -> TrialOrder | None:
+            trial = self._ask()
+            if trial is None:
+                return None
+            settings = _settings(self.config, trial)
+            return TrialOrder(trial.number, settings, self.episodes, self.device, self.num_threads)
+
+        def report(number: int, value: float, interval: int) -> bool:
+            return number in self.running and _report(self.running[number][0], value, interval)
+
+        try:
+            return run_trials(ask, report, self._tell, Demand.of(self.num_threads, self.device))
+        finally:
+            for number in list(self.running):  # to be repeated by the next call
+                self._tell(number, KeyboardInterrupt())
+
+    def _ask(self) -> optuna.Trial | None:
+        """Starts a trial; None if enough are done or running."""
+        if len(_done(self.study)) + len(self.running) >= self.trials:
+            return None
+        trial = self.study.ask()
+        self.running[trial.number] = (trial, time.perf_counter())
+        return trial
+
+    def _tell(self, number: int, outcome: float | BaseException) -> None:
+        """Stores the outcome of a trial: its success rate, or why it has none."""
+        trial, start = self.running.pop(number)
+        if isinstance(outcome, float):
+            self.study.tell(trial, outcome)
+            text = f"success {outcome:.1%}"
+        elif isinstance(outcome, Stopped):
+            self.study.tell(trial, state=TrialState.PRUNED)
+            text = "stopped early"
+        elif isinstance(outcome, ValueError):
+            trial.set_user_attr(FAILURE, str(outcome))
+            self.study.tell(trial, state=TrialState.FAIL)
+            text = f"failed: {' '.join(str(outcome).split()):.100}"
+        else:
+            self.study.tell(trial, state=TrialState.FAIL)
+            lost = not isinstance(outcome, KeyboardInterrupt)
+            text = f"lost with its worker ({outcome})" if lost else "interrupted"
+        seconds = time.perf_counter() - start
+        print(f"trial {number}: {text} in {seconds:.0f} s; {_summary(self.study)}", file=sys.stderr)
 
 
 def _success(
@@ -151,24 +192,22 @@ def _success(
     num_threads: int,
 ) -> float:
     """Trains with the settings of a trial and returns the success rate of the policy."""
+    return success_of(
+        _settings(config, trial), episodes, device, num_threads, partial(_report, trial)
+    )
+
+
+def _settings(config: TrainConfig, trial: optuna.Trial) -> TrainConfig:
+    """The settings of a trial."""
     drawn = with_drawn(config, draw(config.algo, trial))
     seed = (config.seed or 0) + trial.number
-    drawn = drawn.replace("search", seed=seed, target_success_rate=None, eval_freq=0)
-    with tempfile.TemporaryDirectory() as folder:
-        trained = train(
-            drawn,
-            Path(folder),
-            device=device,
-            num_threads=num_threads,
-            save_every=2 * config.n_timesteps,  # only at the end
-            quiet=True,
-            callbacks=[Pruning(trial, config.n_timesteps)],
-        )
-        if trained.interrupted:
-            raise KeyboardInterrupt
-        policy = trained_policy(trained.folder.path)
-        outcome = evaluate(policy, episodes, seed=FIRST_SEED, quiet=True)
-    return float(outcome.success_at_end.mean())
+    return drawn.replace("search", seed=seed, target_success_rate=None, eval_freq=0)
+
+
+def _report(trial: optuna.Trial, value: float, interval: int) -> bool:
+    """Stores an intermediate success rate; whether most other trials are better."""
+    trial.report(value, interval)
+    return trial.should_prune()
 
 
 def _study(
@@ -203,7 +242,10 @@ def _study(
     seed = ((config.seed or 0) + len(study.trials)) % SEED_LIMIT
     running = any(trial.state == TrialState.RUNNING for trial in study.trials)
     # a process that runs at the same time may have the same number of trials: no seed then
-    study.sampler = optuna.samplers.TPESampler(seed=None if running else seed)
+    study.sampler = optuna.samplers.TPESampler(
+        seed=None if running else seed,
+        constant_liar=True,  # trials that run at the same time differ
+    )
     study.pruner = optuna.pruners.MedianPruner(STARTUP_TRIALS, WARMUP_REPORTS + 1)
     return study
 

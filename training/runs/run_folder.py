@@ -13,6 +13,7 @@ import io
 import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -199,6 +200,27 @@ def atomic_write(path: Path) -> Iterator[io.BufferedWriter]:
         unfinished.unlink(missing_ok=True)
 
 
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """Yields an empty folder that becomes `path`, which must not exist, once it is complete.
+
+    Its files are flushed to the disk first. If writing fails, or the process is killed, there is no
+    `path`. One process at a time may write folders of the same name up to the last underscore.
+    """
+    unfinished = path.with_name(f"{path.name.rpartition('_')[0]}.tmp")
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a killed process
+    try:
+        unfinished.mkdir()
+        yield unfinished
+        for file in unfinished.iterdir():
+            _sync(file)
+        _sync(unfinished)
+        os.replace(unfinished, path)
+        _sync(path.parent)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
 def folder_name(env_id: str) -> str:
     """An environment id as part of a folder name, as in RigidEnvs-Push-v0."""
     return env_id.replace("/", "-").replace(":", "-")
@@ -259,6 +281,20 @@ def _make_next(prefix: Path, number: int) -> Path:
 def _write_text(path: Path, text: str) -> None:
     with atomic_write(path) as file:
         file.write(text.encode("utf-8"))
+
+
+def _sync(path: Path) -> None:
+    """Flushes a file, or a folder's entries, to the disk.
+
+    Does nothing for folders where they cannot be opened.
+    """
+    if os.name != "posix" and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _runs(folder: Path) -> list[tuple[str, int, Path]]:

@@ -11,7 +11,6 @@ previous one removed. If the process is killed at any moment, the highest number
 """
 
 import io
-import os
 import pickle
 import shutil
 from collections.abc import Callable
@@ -22,7 +21,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training.policies.export import policy_file_of
-from training.runs.run_folder import CHECKPOINT, RunFolder
+from training.runs.run_folder import CHECKPOINT, RunFolder, atomic_folder
 from training.sb3.model_state import REPLAY, state_files, write_replay
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
@@ -71,22 +70,16 @@ def save_checkpoint(
 
     previous = folder.checkpoints()
     number = max((number for number, _ in previous), default=0) + 1
-    unfinished = folder.path / f"{CHECKPOINT}.tmp"
     try:
-        shutil.rmtree(unfinished, ignore_errors=True)  # left by a killed process
-        unfinished.mkdir()
-        for name, data in files.items():
-            _write(unfinished / name, lambda file, data=data: file.write(data))  # type: ignore[misc]
-        if folder.progress.exists():
-            curve = folder.progress.read_bytes()
-            _write(unfinished / folder.progress.name, lambda file: file.write(curve))
-        if hasattr(model, "replay_buffer"):
-            _write(unfinished / REPLAY, lambda file: write_replay(model, file))
-        _sync(unfinished)
-        os.replace(unfinished, folder.path / f"{CHECKPOINT}_{number}")
-        _sync(folder.path)
+        with atomic_folder(folder.path / f"{CHECKPOINT}_{number}") as unfinished:
+            for name, data in files.items():
+                _write(unfinished / name, lambda file, data=data: file.write(data))  # type: ignore[misc]
+            if folder.progress.exists():
+                curve = folder.progress.read_bytes()
+                _write(unfinished / folder.progress.name, lambda file: file.write(curve))
+            if hasattr(model, "replay_buffer"):
+                _write(unfinished / REPLAY, lambda file: write_replay(model, file))
     except OSError as error:
-        shutil.rmtree(unfinished, ignore_errors=True)
         raise UsageError(
             f"cannot write a checkpoint to {folder.path}: {error.strerror or error}; "
             + ("the previous one is intact" if previous else "there is no previous one")
@@ -130,16 +123,3 @@ class PeriodicCheckpoint(BaseCallback):
 def _write(path: Path, write: Callable[[BinaryIO], Any]) -> None:
     with path.open("wb") as file:
         write(file)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _sync(folder: Path) -> None:
-    """Flushes a folder's entries to the disk; does nothing where folders cannot be opened."""
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

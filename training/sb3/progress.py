@@ -49,7 +49,7 @@ class TrainingProgress(BaseCallback):
 
     def close(self) -> None:
         """Removes the bar; safe to call at any time."""
-        if self.model is not None and self.bar.live.is_started:
+        if getattr(self, "model", None) is not None and self.bar.live.is_started:
             self._show()
         self.bar.stop()
 

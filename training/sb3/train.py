@@ -1,29 +1,27 @@
 """Trains a policy into a new run folder, or resumes a run."""
 
-import dataclasses
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-from training.policies.export import policy_file_of
 from training.runs.run_folder import RunFolder, create_run_folder
 from training.sb3.bootstrap import BatchedTimeoutBootstrap
 from training.sb3.build import worlds_and_model
 from training.sb3.checkpoint import PeriodicCheckpoint, save_checkpoint
+from training.sb3.checks import checked_worlds_and_model, state_to_resume, with_seed
 from training.sb3.evaluation import SuccessEvaluation
 from training.sb3.finetune import FineTuning
 from training.sb3.learning_curve import continued_logger
-from training.sb3.model_state import read_state, restore
+from training.sb3.model_state import restore
 from training.sb3.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.sb3.rollout_threads import OneThreadRollouts
 from training.sb3.vec_env import RigidVecEnv
@@ -82,6 +80,7 @@ def train(
     save_every: int | None = None,
     quiet: bool = False,
     callbacks: Sequence[BaseCallback] = (),
+    after_checkpoint: Callable[[RunFolder], None] | None = None,
 ) -> TrainResult:
     """Trains with the given settings; Ctrl-C ends training early and saves the policy.
 
@@ -94,28 +93,21 @@ def train(
         save_every: Steps between checkpoints; by default a tenth of the run.
         quiet: Show no progress.
         callbacks: Additional callbacks, called last in every step.
+        after_checkpoint: Called with the run folder after each checkpoint, also the last one.
 
     Raises:
-        UsageError: The environment rejects its arguments, the device does not exist, the run would
-            end before the first update, HER cannot recompute this reward, or the disk is full. The
-            last checkpoint remains.
+        UsageError: As `check_settings`, or the device does not exist, or the disk is full. The last
+            checkpoint remains.
     """
-    if isinstance(config, SACConfig) and config.learning_starts >= config.n_timesteps:
-        raise UsageError(
-            f"{config.env_id}: learning_starts is {config.learning_starts}, should be less than "
-            f"n_timesteps = {config.n_timesteps}, or nothing is learned"
-        )
-    seed = config.seed if config.seed is not None else int(np.random.default_rng().integers(2**31))
-    config = dataclasses.replace(config, seed=seed)
-    with worlds_and_model(config, device, num_threads) as (worlds, model):
-        policy_file_of(model, config).to_bytes()  # reports a policy that cannot be saved now
-        _check_her(config, worlds.envs)
-        _check_finetuning(config, worlds)
+    config = with_seed(config)
+    with checked_worlds_and_model(config, device, num_threads) as (worlds, model):
         folder = create_run_folder(log_folder, config)
         with folder.locked():
             with _reporting_os_errors(folder):
                 model.set_logger(configure(str(folder.path), ["csv", "tensorboard"]))
-            return _learn(model, worlds, folder, config, save_every, quiet, more=callbacks)
+            return _learn(
+                model, worlds, folder, config, save_every, quiet, after_checkpoint, more=callbacks
+            )
 
 
 def resume(
@@ -125,6 +117,7 @@ def resume(
     num_threads: int = 1,
     save_every: int | None = None,
     quiet: bool = False,
+    after_checkpoint: Callable[[RunFolder], None] | None = None,
 ) -> TrainResult:
     """Resumes a run from its last checkpoint and trains for the steps that remain.
 
@@ -137,6 +130,7 @@ def resume(
         num_threads: As for `train`.
         save_every: As for `train`.
         quiet: Show no progress.
+        after_checkpoint: As for `train`.
 
     Raises:
         UsageError: The folder holds no run, no checkpoint or a damaged one, the run is finished, or
@@ -144,29 +138,19 @@ def resume(
     """
     config = folder.config()
     with folder.locked():
-        found = folder.checkpoints()
-        if not found:
-            raise UsageError(
-                f"{folder.path} has no checkpoint: the run ended before the first one; "
-                "start a new run"
-            )
-        checkpoint = max(found)[1]
+        checkpoint, state = state_to_resume(folder)
         with worlds_and_model(config, device, num_threads) as (worlds, model):
             try:
-                state = read_state(checkpoint)
                 restore(model, checkpoint)
-                before, finished = _Elapsed.of(state), bool(state["finished"])
+                before = _Elapsed.of(state)
             except Exception as error:  # a damaged file can raise any exception
                 raise UsageError(f"{checkpoint} is damaged: {error}") from error
-            if finished or model.num_timesteps >= config.n_timesteps:
-                raise UsageError(
-                    f"{folder.path} is finished after {model.num_timesteps:,} steps: "
-                    "nothing to resume"
-                )
             folder.record_resumption(model.num_timesteps)
             with _reporting_os_errors(folder):
                 model.set_logger(continued_logger(folder, checkpoint, state))
-            return _learn(model, worlds, folder, config, save_every, quiet, before)
+            return _learn(
+                model, worlds, folder, config, save_every, quiet, after_checkpoint, before
+            )
 
 
 def _learn(
@@ -176,6 +160,7 @@ def _learn(
     config: TrainConfig,
     save_every: int | None,
     quiet: bool,
+    after_checkpoint: Callable[[RunFolder], None] | None = None,
     before: _Elapsed = _Elapsed(),
     more: Sequence[BaseCallback] = (),
 ) -> TrainResult:
@@ -195,6 +180,8 @@ def _learn(
             seconds_in_envs=now.in_envs,
             finished=finished,
         )
+        if after_checkpoint is not None:
+            after_checkpoint(folder)
 
     progress = TrainingProgress(config.n_timesteps, quiet, before.total)
     checkpoints = PeriodicCheckpoint(save_every or max(config.n_timesteps // 10, 1), save)
@@ -260,33 +247,6 @@ def _callbacks(config: TrainConfig, worlds: RigidVecEnv) -> list[BaseCallback]:
         if config.target_success_rate is not None:
             callbacks.append(StopAtSuccess(config.target_success_rate, evaluation, finetuning))
     return callbacks
-
-
-def _check_her(config: TrainConfig, envs: Any) -> None:
-    """Raises UsageError if HER is configured and cannot recompute the reward from goals."""
-    if not isinstance(config, SACConfig) or config.replay_buffer_class is None:
-        return
-    goal = np.zeros((1, *envs.single_observation_space["desired_goal"].shape))
-    try:
-        envs.compute_reward(goal, goal + 1.0, [{}])
-    except ValueError as error:
-        raise UsageError(
-            f"{config.env_id}: HerReplayBuffer computes rewards from goals alone: {error}"
-        ) from None
-
-
-def _check_finetuning(config: TrainConfig, worlds: RigidVecEnv) -> None:
-    """Raises UsageError if the environment of the fine-tuning stage cannot be used."""
-    if not config.finetune_timesteps:
-        return
-    envs = make_training_env(config, config.last_stage_kwargs)
-    try:
-        worlds.check_compatible(envs)
-        _check_her(config, envs)
-    except ValueError as error:
-        raise UsageError(f"finetune_env_kwargs is {config.finetune_env_kwargs}: {error}") from None
-    finally:
-        envs.close()
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 """Makes environments by id, with error messages that name a wrong id or argument."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import gymnasium as gym
@@ -18,6 +20,21 @@ if TYPE_CHECKING:  # at run time it would import yaml, which reading a policy do
 
 Made = TypeVar("Made")
 
+_threads: ContextVar[int | None] = ContextVar("threads", default=None)
+
+
+@contextmanager
+def environment_threads(threads: int) -> Iterator[None]:
+    """Meanwhile, vector environments are made with this many threads instead of one for each core.
+
+    It affects environments of this project whose arguments don't include `threads`.
+    """
+    before = _threads.set(threads)
+    try:
+        yield
+    finally:
+        _threads.reset(before)
+
 
 def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorEnv:
     """The native vector environment with autoreset mode SAME_STEP.
@@ -33,7 +50,7 @@ def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorE
             num_envs=num_envs,
             vectorization_mode="vector_entry_point",
             autoreset_mode=AutoresetMode.SAME_STEP,
-            **env_kwargs,
+            **{**_machine(env_id), **env_kwargs},
         ),
     )
 
@@ -68,13 +85,10 @@ def effective_fidelity(env_id: str, env_kwargs: dict[str, Any]) -> Any:
 
     None for an environment without such an argument.
     """
-    spec = _spec(env_id)
-    arguments = {**spec.kwargs, **env_kwargs}
+    arguments = {**_spec(env_id).kwargs, **env_kwargs}
     if "fidelity" in arguments:
         return arguments["fidelity"]
-    entry_point = spec.vector_entry_point
-    creator = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
-    parameter = inspect.signature(creator).parameters.get("fidelity") if creator else None
+    parameter = _parameter(env_id, "fidelity")
     return parameter.default if parameter else None
 
 
@@ -95,6 +109,20 @@ def registered_arguments(env_id: str) -> dict[str, Any]:
         UsageError: The id is unknown.
     """
     return {name: value for name, value in _spec(env_id).kwargs.items() if name != "task"}
+
+
+def _machine(env_id: str) -> dict[str, Any]:
+    """The number of threads that `environment_threads` sets, if the environment accepts it."""
+    threads = _threads.get()
+    accepted = threads is not None and _parameter(env_id, "threads") is not None
+    return {"threads": threads} if accepted else {}
+
+
+def _parameter(env_id: str, name: str) -> inspect.Parameter | None:
+    """A parameter of the vector environment's constructor; None if it has no such parameter."""
+    entry_point = _spec(env_id).vector_entry_point
+    creator = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
+    return inspect.signature(creator).parameters.get(name) if creator else None
 
 
 def _make(env_id: str, env_kwargs: dict[str, Any], make: Callable[[], Made]) -> Made:

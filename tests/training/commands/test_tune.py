@@ -10,6 +10,7 @@ from optuna.trial import TrialState
 
 from training.commands import cli, tuning
 from training.commands.tuning import tune
+from training.results import trial
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
@@ -31,7 +32,7 @@ def small_space(monkeypatch, request):
     sac = {"batch_size": (16, 32), "gradient_steps": (1,), "net_arch": ("8", "8 8")}
     for name, values in sac.items():
         monkeypatch.setitem(SPACES["sac"], name, OneOf(values))
-    monkeypatch.setattr(tuning, "train", partial(one_thread, tuning.train))
+    monkeypatch.setattr(trial, "train", partial(one_thread, trial.train))
 
 
 def one_thread(train, *arguments, **options):
@@ -120,7 +121,7 @@ def test_ctrl_c_during_training_ends_the_search(words, monkeypatch, capsys):
     def interrupted(self):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tuning.Pruning, "_on_step", interrupted)
+    monkeypatch.setattr(trial.IntermediateReports, "_on_step", interrupted)
     assert cli.main(words) == 130
     assert "trial 0: interrupted" in capsys.readouterr().err
 

@@ -1,0 +1,1 @@
+"""Runs and trials as tasks of a Ray cluster. Needs the extra `ray`."""
