@@ -87,7 +87,7 @@ def test_a_killed_node_costs_only_the_work_since_the_last_checkpoint(fragile, tm
         wait_for(lambda: all(folder.checkpoints() for folder in folders), process)
         fragile.remove_node(fragile.list_all_nodes()[1], allow_graceful=False)
         out, err = process.communicate(timeout=240)
-    # Ray has been seen to terminate a driver that had finished and disconnected, in one run of seven
+    # Ray was seen to terminate a driver that had finished and disconnected, in one run of seven
     assert process.returncode in (0, -signal.SIGTERM), out + err
     assert out.count("trained after") == 2
     assert "its worker was lost" in err
