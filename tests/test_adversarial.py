@@ -87,6 +87,24 @@ def test_a_gain_of_energy_is_found(runner):
     assert not (balance.gain > balance.allowed).any()
 
 
+def test_a_body_escapes_that_is_below_the_ground_after_two_steps(monkeypatch, folder):
+    """The third world is below it for one step, the fourth for two; the fifth in two episodes."""
+    below = {7: [2, 3], 8: [3, 4], 9: [4]}
+
+    def marked(world):
+        mask = np.zeros(WORLDS, dtype=bool)
+        mask[below.get(run._steps, [])] = True
+        return mask
+
+    monkeypatch.setattr(chunk, "below_ground", marked)
+    monkeypatch.setattr(chunk, "out_of_world", marked)
+    run = Run(Combination("push", "balanced", "bang-bang", "scene"), 1, WORLDS)
+    run.advance(8)
+    run._ended[4] = True  # its next episode starts
+    figures = run.advance(4)
+    assert (figures.sank, figures.escaped) == (4, 1)
+
+
 def test_a_failure_is_saved_and_replays_bitwise(monkeypatch, folder, capsys):
     marked = np.arange(WORLDS) == 5
 

@@ -55,7 +55,8 @@ class Figures(NamedTuple):
         episodes: episodes that began.
         not_finite: episodes that diverged or returned a number that is not finite.
         sank: episodes in which the centre of a body was below the ground.
-        escaped: episodes in which all of a body was.
+        escaped: episodes in which all of a body was, after two steps in a row. The ground pushes
+            out what a hand has rammed below its surface; what stays there has escaped.
         gained: episodes in which a world gained energy.
         different: steps in which all worlds and a few by themselves were not bitwise equal.
         lowest: m, the lowest centre of a body.
@@ -107,6 +108,7 @@ class Run:
         self._next_commands = ACTIONS[actions](self.runner, draw)
         self._balance = Balance(self.runner.world)
         self._ended = np.zeros(worlds, dtype=bool)
+        self._under = np.zeros(worlds, dtype=bool)  # all of a body was below the ground
         # kind of failure that the episode of each world has already counted
         self._counted = {name: np.zeros(worlds, dtype=bool) for name in KINDS[1:4]}
         steps = self.runner.max_episode_steps or self.runner.task.max_episode_steps
@@ -170,9 +172,10 @@ class Run:
         world = self.runner.world
         for counted in self._counted.values():
             counted &= ~began
-        below = below_ground(world)
+        below, before = below_ground(world), self._under & ~began
+        self._under = below & out_of_world(world) if below.any() else below
         if below.any():
-            for kind, mask in (("sank", below), ("escaped", below & out_of_world(world))):
+            for kind, mask in (("sank", below), ("escaped", self._under & before)):
                 new = mask & ~self._counted[kind]
                 self._counted[kind] |= new
                 self._note(kind, sunk(world, new))

@@ -115,14 +115,19 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
             a `max_episode_steps` equal to the registered one.
     """
     words = [folder_name(plain_id(env_id))]
+    for name in changed_arguments(env_id, arguments):
+        value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
+        words.append(f"{name}-{value.strip('-')}")
+    return "-".join(words)
+
+
+def changed_arguments(env_id: str, arguments: dict[str, Any]) -> list[str]:
+    """Names of the arguments that make another task than the registered one, see `task_name`."""
     spec = gym.registry.get(env_id)
     changed = {name for name, value in arguments.items() if value}
     if spec is not None and arguments.get("max_episode_steps") == spec.max_episode_steps:
         changed.discard("max_episode_steps")
-    for name in sorted(changed - set(SAME_TASK)):
-        value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
-        words.append(f"{name}-{value.strip('-')}")
-    return "-".join(words)
+    return sorted(changed - set(SAME_TASK))
 
 
 def read_result(file: Path) -> Result:

@@ -9,8 +9,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from training.results.result import Result, read_results
-from training.runs.run_folder import folder_name
+from training.results.result import Result, changed_arguments, read_results
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.environment_ids import dense_id, plain_id
@@ -135,8 +134,10 @@ def _expected(repository: Path) -> dict[Path, str]:
 def _section(group: Sequence[Result], settings: TrainConfig) -> str:
     """The section of a kind: its table, commands and images."""
     first = group[0]
+    changed = changed_arguments(first.env_id, first.arguments)
+    task = " with ".join([plain_id(first.env_id), *([", ".join(changed)] if changed else [])])
     lines = [
-        f"## {plain_id(first.env_id)}, {first.algorithm.upper()}",
+        f"## {task}, {first.algorithm.upper()}",
         "",
         _environment(first) + _first_stage(first, settings),
         "",
@@ -228,7 +229,8 @@ def _versions(one: Result) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    """The table of environments in the README: sizes, and results by algorithm."""
+    """The table in the README: sizes, and results by algorithm, of environments as registered."""
+    results = [one for one in results if not changed_arguments(one.env_id, one.arguments)]
     algorithms = list(dict.fromkeys(one.algorithm for one in results))
     columns = ["environment", "", "observation", "action", "steps per episode"]
     for algorithm in algorithms:
@@ -249,19 +251,13 @@ def _summary(results: Sequence[Result]) -> str:
 
 def _task_key(one: Result) -> str:
     """A key that is the same for the sparse and the dense id of a task."""
-    task = gym.spec(one.env_id).kwargs.get("task", one.env_id)
-    return f"{task} {_changes(one)}"
+    return str(gym.spec(one.env_id).kwargs.get("task", one.env_id))
 
 
 def _names(one: Result) -> str:
-    """The registered ids of a task, sparse and dense, and the arguments that change it."""
+    """The registered ids of a task, sparse and dense."""
     ids = [name for name in (plain_id(one.env_id), dense_id(one.env_id)) if name in gym.registry]
-    return f"{'<br>'.join(ids)} {_changes(one)}".strip()
-
-
-def _changes(one: Result) -> str:
-    """The arguments that make it another task."""
-    return one.task.removeprefix(folder_name(plain_id(one.env_id))).removeprefix("-")
+    return "<br>".join(ids)
 
 
 def _image(one: Result) -> str:

@@ -9,7 +9,14 @@ from tests.training.results.recorded import PLACE, update
 from training.commands import cli
 from training.results.result import read_results
 from training.results.results import SOURCE
-from training.results.results_page import README, check_pages, page_text, readme_text
+from training.results.results_page import (
+    README,
+    _section,
+    check_pages,
+    page_text,
+    readme_text,
+)
+from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 
 
@@ -47,6 +54,22 @@ def test_pages_name_both_ids_of_a_dense_environment():
         assert "| RigidEnvs/Push-v0<br>RigidEnvs/PushDense-v0 | <img" in table
     sparse = next(result for result in results if result.algorithm == "sac")
     assert "Dense" not in page_text([sparse], SOURCE)
+
+
+def test_a_task_with_other_arguments_has_its_own_section_and_no_row_in_the_readme():
+    given = next(r for r in read_results(SOURCE) if r.kind == "ppo-RigidEnvs-Push-v0")
+    arguments = {**given.arguments, "randomize": {"mass": [0.5, 2.0]}}
+    other = dataclasses.replace(given, arguments=arguments)
+    page = page_text([given], SOURCE)
+    assert "## RigidEnvs/Push-v0, PPO\n" in page
+    assert other.task == "RigidEnvs-Push-v0-randomize-mass-0.5-2.0"
+    section = _section([other], load_config("ppo", given.env_id))
+    assert section.startswith("## RigidEnvs/Push-v0 with randomize, PPO\n")
+    tables = [
+        readme_text("<!-- results -->\n<!-- /results -->\n", results)
+        for results in ([given], [given, other])
+    ]
+    assert tables[0] == tables[1]
 
 
 def test_pages_without_results(repository, tmp_path):
