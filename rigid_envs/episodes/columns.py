@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.compiler.jit import entry
-from rigid_envs.tasks.goals import MEASURES, Measure
+from rigid_envs.tasks.goals import SOURCES, Measure
 
 Array = np.ndarray
 
@@ -40,7 +40,7 @@ class Observed(NamedTuple):
 
 @cache
 def _make_split(measure: Measure) -> Any:
-    sources = MEASURES
+    sources = SOURCES
 
     @entry
     def split(table, low, high, goals, rows):
@@ -116,7 +116,7 @@ def split(
 
 @cache
 def _make_clip_actions() -> Any:
-    sources = MEASURES
+    sources = SOURCES
 
     @entry
     def clip_actions(rows, clipped):

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES, hash_sources
+from physics.compiler.code_cache import SOURCES as ENGINE
+from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
@@ -22,7 +23,7 @@ Measure = Callable[[Array, Array, int], float]
 """A stage: the distance between the goals a[:, i] and b[:, i]."""
 
 # kernels with a measure are compiled again after an edit of a task
-MEASURES = SOURCES ^ hash_sources(Path(__file__).parent)
+SOURCES: int = ENGINE ^ hash_sources(Path(__file__).parent)
 
 
 @stage
@@ -41,7 +42,7 @@ def points(a, b, i):
 
 @cache
 def _make_distances(measure: Measure) -> Any:
-    sources = MEASURES
+    sources = SOURCES
 
     @entry
     def distances(a, b, out):
