@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from training.commands import extras, flags, handlers
+from training.commands import extras, flags, handlers, shared_flags, values
 from training.settings.errors import UsageError
 
 
@@ -63,18 +63,18 @@ def _parser() -> argparse.ArgumentParser:
         return added
 
     training = command("train", handlers.train, "Train a policy into a new run folder.")
-    flags.add_training(training)
+    shared_flags.add_training(training)
     flags.add_runs(training)
 
     evaluation = command("evaluate", handlers.evaluate, "Measure the success rate of a policy.")
-    flags.add_policy(evaluation)
-    flags.add_episodes(evaluation, 1000)
+    shared_flags.add_policy(evaluation)
+    shared_flags.add_episodes(evaluation, 1000)
 
     recording = command(
         "record", handlers.record, "Record a video of a policy (mp4 or GIF) and a still image."
     )
-    flags.add_policy(recording)
-    flags.add_episodes(recording, 8)
+    shared_flags.add_policy(recording)
+    shared_flags.add_episodes(recording, 8)
     recording.add_argument(
         "-o",
         "--output",
@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     scripted.add_argument(
         "--env", default=flags.DEFAULT_ENV, help="environment id (default: %(default)s)"
     )
-    flags.add_episodes(scripted, 1000)
+    shared_flags.add_episodes(scripted, 1000)
 
     playing = command(
         "play",
@@ -139,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         "Search training settings by many short trials.",
         ("tune", extras.TUNE_EXTRA),
     )
-    flags.add_training(tuning)
+    shared_flags.add_training(tuning)
     flags.add_tuning(tuning)
 
     fidelity = command(
@@ -155,10 +155,10 @@ def _parser() -> argparse.ArgumentParser:
         handlers.demo,
         "Train a policy, evaluate it, record a video and plot the learning curve.",
     )
-    flags.add_training(demonstration)
+    shared_flags.add_training(demonstration)
     demonstration.add_argument(
         "--n-episodes",
-        type=flags.count,
+        type=values.count,
         default=1000,
         help="episodes of the evaluation (default: %(default)s)",
     )

@@ -1,15 +1,20 @@
-"""Command-line flags of all commands, and the valid values of their numbers."""
+"""The parser of the command line, and the flags that one command has."""
 
 import argparse
-from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
 from training.commands.seeds import seeds
+from training.commands.shared_flags import (
+    DEFAULT_ENV,
+    add_env_kwargs,
+    add_environment,
+    add_folder,
+    add_latest,
+    add_ray,
+)
+from training.commands.values import count, port, positive, whole
 from training.settings.errors import UsageError
-
-DEFAULT_ALGO = "ppo"
-DEFAULT_ENV = "RigidEnvs/Push-v0"
 
 
 class Parser(argparse.ArgumentParser):
@@ -18,45 +23,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raises UsageError, whose line the caller prints."""
         raise UsageError(f"{message} (see {self.prog} --help)")
-
-
-def add_training(parser: argparse.ArgumentParser) -> None:
-    """Flags for the settings of training, and for the machine."""
-    parser.add_argument(
-        "--algo",
-        help=f"algorithm: ppo or sac (default: {DEFAULT_ALGO}; with --resume, that of the run)",
-    )
-    parser.add_argument(
-        "--env",
-        help=f"environment id (default: {DEFAULT_ENV}; with --resume, that of the run)",
-    )
-    parser.add_argument(
-        "--config", type=Path, help="YAML file of settings (default: configs/<algo>.yaml)"
-    )
-    parser.add_argument(
-        "-n", "--n-timesteps", type=count, help="environment steps, summed over worlds"
-    )
-    parser.add_argument("--n-envs", type=count, help="number of worlds simulated in parallel")
-    parser.add_argument("--seed", type=whole, help="seed of worlds, network and sampling")
-    parser.add_argument(
-        "-params",
-        "--hyperparams",
-        nargs="+",
-        default=[],
-        metavar="KEY:VALUE",
-        help="settings that replace those of the file, as in n_epochs:4 gamma:0.95",
-    )
-    parser.add_argument(
-        "--demonstrations",
-        metavar="DATASET",
-        help="Minari dataset from which SAC samples a part of each batch; see rigid-envs dataset",
-    )
-    parser.add_argument(
-        "--num-threads", type=count, default=1, help="number of torch threads (default: 1)"
-    )
-    add_folder(parser)
-    add_environment(parser)
-    add_device(parser)
 
 
 def add_runs(parser: argparse.ArgumentParser) -> None:
@@ -73,39 +39,6 @@ def add_runs(parser: argparse.ArgumentParser) -> None:
         "--save-freq",
         type=count,
         help="steps between checkpoints (default: a tenth of the run)",
-    )
-
-
-def add_ray(parser: argparse.ArgumentParser) -> None:
-    """The flag for a Ray cluster."""
-    parser.add_argument(
-        "--ray", nargs="?", const="", metavar="ADDRESS",
-        help="work on the nodes of the Ray cluster at HOST:PORT (default: that of this machine, or "
-        "a new one); each run or trial takes --num-threads CPUs",
-    )  # fmt: skip
-
-
-def add_policy(parser: argparse.ArgumentParser) -> None:
-    """Flags for the choice of a policy."""
-    parser.add_argument(
-        "policy",
-        nargs="?",
-        metavar="POLICY",
-        help='run folder, .safetensors file, model.zip, "trained" (comes with it) or "scripted" '
-        "(default: the run started last)",
-    )
-    add_latest(parser)
-    add_device(parser)
-    parser.add_argument(
-        "--stochastic",
-        action="store_true",
-        help="sample actions instead of using their mean; reads model.zip, so it requires "
-        "--trust-pickle",
-    )
-    parser.add_argument(
-        "--trust-pickle",
-        action="store_true",
-        help="load model.zip, which can run any code; use it only if you trust its author",
     )
 
 
@@ -164,19 +97,6 @@ def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, help="of the first episode (default: 0)")
     add_env_kwargs(parser)
-    add_folder(parser)
-
-
-def add_latest(parser: argparse.ArgumentParser) -> None:
-    """Flags that select the run started last, or describe a model.zip outside a run folder."""
-    parser.add_argument(
-        "--algo",
-        help="algorithm: ppo or sac (default: that of the policy or of the run started last)",
-    )
-    parser.add_argument(
-        "--env",
-        help=f"environment id (default: likewise; of trained and scripted: {DEFAULT_ENV})",
-    )
     add_folder(parser)
 
 
@@ -357,90 +277,3 @@ def add_tuning(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--study-name", help="name of the study in the database (default: <algo>-<environment>)"
     )
-
-
-def add_folder(parser: argparse.ArgumentParser) -> None:
-    """The flag for the folder of runs."""
-    parser.add_argument(
-        "-f",
-        "--log-folder",
-        type=Path,
-        default=Path("runs"),
-        help="folder of the run folders (default: %(default)s)",
-    )
-
-
-def add_episodes(parser: argparse.ArgumentParser, default: int) -> None:
-    """Flags for episodes to play: their number, seeds and environment."""
-    parser.add_argument(
-        "-n",
-        "--n-episodes",
-        type=count,
-        default=default,
-        help="number of episodes (default: %(default)s)",
-    )
-    parser.add_argument("--seed", type=whole, help="seed of the first episode (default: 1000000)")
-    add_environment(parser)
-
-
-def add_environment(parser: argparse.ArgumentParser) -> None:
-    """Flags for arguments of the environment."""
-    parser.add_argument(
-        "--fidelity",
-        help="fidelity preset: fast, balanced, accurate or solid (default: as in the settings or "
-        "the policy, otherwise balanced)",
-    )
-    add_env_kwargs(parser)
-
-
-def add_env_kwargs(parser: argparse.ArgumentParser) -> None:
-    """The flag for arguments of the environment."""
-    parser.add_argument(
-        "--env-kwargs",
-        nargs="+",
-        default=[],
-        metavar="KEY:VALUE",
-        help="arguments of the environment, as in reward_type:sparse",
-    )
-
-
-def add_device(parser: argparse.ArgumentParser) -> None:
-    """The flag for the device of the networks."""
-    parser.add_argument(
-        "--device", default="cpu", help="torch device of the networks (default: %(default)s)"
-    )
-
-
-def count(text: str) -> int:
-    """Parses an integer of at least 1; 1e6 and 1_000_000 are valid."""
-    return _integer(text, 1)
-
-
-def whole(text: str) -> int:
-    """Parses an integer of at least 0."""
-    return _integer(text, 0)
-
-
-def port(text: str) -> int:
-    """Parses a port: an integer from 0, for a free one, to 65535."""
-    value = _integer(text, 0)
-    if value > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} should be a port, at most 65535")
-    return value
-
-
-def positive(text: str) -> float:
-    """Parses a finite number above 0."""
-    with suppress(ValueError):
-        value = float(text)
-        if 0.0 < value < float("inf"):
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r} should be a finite number above 0")
-
-
-def _integer(text: str, least: int) -> int:
-    with suppress(ValueError):
-        value = float(text)
-        if value >= least and value.is_integer():
-            return int(value)
-    raise argparse.ArgumentTypeError(f"{text!r} should be an integer of at least {least}")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from training.commands.extras import RAY_EXTRA, require
-from training.commands.flags import DEFAULT_ENV
 from training.commands.options import (
     check_resumable,
     check_seeds,
@@ -19,6 +18,7 @@ from training.commands.options import (
     policy_of,
     run_folder_of,
 )
+from training.commands.shared_flags import DEFAULT_ENV
 from training.settings.errors import UsageError
 
 INTERRUPTED = 130

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from training.commands.flags import DEFAULT_ALGO, DEFAULT_ENV
+from training.commands.shared_flags import DEFAULT_ALGO, DEFAULT_ENV
 from training.settings.errors import UsageError
 
 if TYPE_CHECKING:
