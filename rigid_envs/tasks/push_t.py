@@ -7,7 +7,7 @@ import numpy as np
 from physics import Body, Box, Compound, Ground, Material, Readout, Scene, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import Ghost, Marker
-from rigid_envs.tasks.coverage import BAR, STEM, UNIT, uncovered
+from rigid_envs.tasks.coverage import BAR, STEM, uncovered
 from rigid_envs.tasks.finger import Finger
 from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.rewards import Reward
@@ -26,10 +26,13 @@ RANGE = 0.1  # m, largest offset of the T's start from the origin along x and y
 FINGER_START = 0.14  # m, from the T's centre
 STARTS = 2  # poses drawn per episode; the first one that covers little of the goal is used
 UNCOVERED_START = 0.3  # least part of the goal that is not covered at the start
-# m, radius of gyration about the vertical axis
-GYRATION = UNIT * np.sqrt(
-    (4.0 * (17.0 / 12.0 + 36.0 / 49.0) + 3.0 * (10.0 / 12.0 + 64.0 / 49.0)) / 7.0
+SHAPE = Compound(
+    [
+        (Box((half_width, half_height, HALF_HEIGHT)), (0.0, middle, 0.0))
+        for middle, half_width, half_height in (BAR, STEM)
+    ]
 )
+GYRATION = float(np.sqrt(SHAPE.inertia(1.0)[2]))  # m, radius of gyration about the vertical axis
 
 
 class PushT(Task):
@@ -61,17 +64,7 @@ class PushT(Task):
     def scene(self) -> Scene:
         """A T on the ground, and a finger beside it."""
         material = Material(friction=FRICTION, restitution=0.1)
-        parts = [
-            (Box((half_width, half_height, HALF_HEIGHT)), (0.0, middle, 0.0))
-            for middle, half_width, half_height in (BAR, STEM)
-        ]
-        body = Body(
-            Compound(parts),
-            mass=MASS,
-            position=(0, 0, HALF_HEIGHT),
-            material=material,
-            name="T",
-        )
+        body = Body(SHAPE, mass=MASS, position=(0, 0, HALF_HEIGHT), material=material, name="T")
         ground = Ground(material=material, name="ground")
         return Scene(bodies=[body], statics=[ground], drives=[self.finger.drive()])
 
@@ -126,16 +119,12 @@ class PushT(Task):
     ) -> dict[str, Array]:
         """`pose`: minus the distance in m of the T's points from where they are at the goal.
 
-        It is the root of the mean square over the T: moved by d and turned by a, it is
-        d^2 + 2 r^2 (1 - cos a), with r the radius of gyration.
-
         `reach`: minus the distance in m from the finger to the T's centre.
         """
         a, b = achieved.astype(float), desired.astype(float)
-        square = np.sum((a - b)[:, :2] ** 2, axis=1)
-        square += GYRATION**2 * np.sum((a - b)[:, 2:] ** 2, axis=1)
+        pose = pose_distance(a[:, 0] - b[:, 0], a[:, 1] - b[:, 1], turn_between(a, b))
         offset = self.finger.position(now)[:, :2] - a[:, :2]
-        return {"pose": -np.sqrt(square), "reach": -np.sqrt(np.sum(offset**2, axis=1))}
+        return {"pose": -pose, "reach": -np.sqrt(np.sum(offset**2, axis=1))}
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
         """The T at its goal."""
@@ -149,3 +138,24 @@ class PushT(Task):
             )
             for middle, half_width, half_height in (BAR, STEM)
         ]
+
+
+def turn_between(a: Array, b: Array) -> Array:
+    """Angle [n] rad, within +-pi, from the yaw of poses b [n, 4] to that of poses a."""
+    return np.asarray(
+        np.arctan2(a[:, 3] * b[:, 2] - a[:, 2] * b[:, 3], a[:, 2] * b[:, 2] + a[:, 3] * b[:, 3])
+    )
+
+
+def pose_distance(x: Array, y: Array, turn: Array) -> Array:
+    """How far [...] m the points of a T move, as the root of their mean square.
+
+    A point at the distance r from the centre of mass moves by 2 r sin(turn / 2) with the turn,
+    which leaves the centre where it is. The mean of r^2 is the square of the radius of gyration.
+
+    Args:
+        x: [...] m, by which the centre of mass moves along x.
+        y: [...] m, by which it moves along y.
+        turn: [...] rad.
+    """
+    return np.asarray(np.sqrt(x * x + y * y + (2.0 * GYRATION * np.sin(0.5 * turn)) ** 2))

@@ -21,7 +21,7 @@ class DemonstrationBuffer(DictReplayBuffer):
     """A replay buffer with demonstrations.
 
     Args:
-        *arguments, **keywords: Those of DictReplayBuffer.
+        *arguments, **keywords: Those of the buffer without demonstrations.
         episodes: The demonstrations.
         fraction: Part of each batch that is sampled from them.
     """
@@ -31,10 +31,12 @@ class DemonstrationBuffer(DictReplayBuffer):
     ):
         super().__init__(*arguments, **keywords)
         self.fraction = fraction
-        self.demonstrations = DictReplayBuffer(
-            _steps(episodes), self.observation_space, self.action_space, self.device
-        )
+        self.demonstrations = self._empty(sum(len(episode.rewards) for episode in episodes))
         _fill(self.demonstrations, episodes)
+
+    def _empty(self, steps: int) -> DictReplayBuffer:
+        """A buffer for the demonstrations."""
+        return DictReplayBuffer(steps, self.observation_space, self.action_space, self.device)
 
     def sample(  # type: ignore[override]
         self, batch_size: int, env: VecNormalize | None = None
@@ -45,39 +47,16 @@ class DemonstrationBuffer(DictReplayBuffer):
         return _joined(own, self.demonstrations.sample(shown, env))
 
 
-class DemonstrationHerBuffer(HerReplayBuffer):
-    """The same with hindsight experience replay.
+class DemonstrationHerBuffer(DemonstrationBuffer, HerReplayBuffer):
+    """The same with hindsight experience replay."""
 
-    Args:
-        *arguments, **keywords: Those of HerReplayBuffer.
-        episodes: The demonstrations.
-        fraction: Part of each batch that is sampled from them.
-    """
-
-    def __init__(
-        self, *arguments: Any, episodes: Sequence[Recorded], fraction: float, **keywords: Any
-    ):
-        super().__init__(*arguments, **keywords)
-        self.fraction = fraction
+    def _empty(self, steps: int) -> DictReplayBuffer:
         assert self.env is not None
-        self.demonstrations = HerReplayBuffer(
-            _steps(episodes), self.observation_space, self.action_space, self.env, self.device,
+        return HerReplayBuffer(
+            steps, self.observation_space, self.action_space, self.env, self.device,
             n_sampled_goal=self.n_sampled_goal,
             goal_selection_strategy=self.goal_selection_strategy,
         )  # fmt: skip
-        _fill(self.demonstrations, episodes)
-
-    def sample(  # type: ignore[override]
-        self, batch_size: int, env: VecNormalize | None = None
-    ) -> DictReplayBufferSamples:
-        """A batch of which a part is from demonstrations."""
-        shown = round(self.fraction * batch_size)
-        own = super().sample(batch_size - shown, env)
-        return _joined(own, self.demonstrations.sample(shown, env))
-
-
-def _steps(episodes: Sequence[Recorded]) -> int:
-    return sum(len(episode.rewards) for episode in episodes)
 
 
 def _fill(buffer: DictReplayBuffer, episodes: Sequence[Recorded]) -> None:

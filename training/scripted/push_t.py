@@ -15,7 +15,15 @@ import numpy as np
 from rigid_envs.tasks.coverage import BAR, STEM, uncovered
 from rigid_envs.tasks.finger import Finger
 from rigid_envs.tasks.goals import distance
-from rigid_envs.tasks.push_t import FRICTION, GRAVITY, GYRATION, MASS, PushT
+from rigid_envs.tasks.push_t import (
+    FRICTION,
+    GRAVITY,
+    GYRATION,
+    MASS,
+    PushT,
+    pose_distance,
+    turn_between,
+)
 
 Array = np.ndarray
 
@@ -27,9 +35,10 @@ _GAP = 0.008  # m, between finger and T on the way to a place
 _TRAVEL = 1.5  # what a metre of travel costs, as a factor on the pose error
 _DETOUR = 1.1  # how much longer a way along the T counts than a straight one
 _CLOSE = 0.008  # m, from the place of contact at which a push starts
-# m, of a push against the whole friction of the T. The servo's force is M omega v, with omega 60/s;
-# with two thirds of the friction the T creeps instead of being thrown ahead
-_LEAD = 2.0 / 3.0 * FRICTION * MASS * GRAVITY / (Finger.MASS * 60.0) * PushT.frame
+# m, of a push against the whole friction of the T. The servo's force is M omega v; with two thirds
+# of the friction the T creeps instead of being thrown ahead
+_SERVO = Finger.MASS * PushT.finger.drive().frequency  # N s/m
+_LEAD = 2.0 / 3.0 * FRICTION * MASS * GRAVITY / _SERVO * PushT.frame
 _DONE = 0.095  # part of the goal that is not covered at which the finger rests
 
 
@@ -144,10 +153,7 @@ def push_t(observation: dict[str, Array]) -> Array:
     # the goal in the T's frame
     offset = goal[:, :2] - pose[:, :2]
     x, y = _turned(offset, pose[:, 2], -pose[:, 3]).T
-    turn = np.arctan2(
-        goal[:, 3] * pose[:, 2] - goal[:, 2] * pose[:, 3],
-        goal[:, 2] * pose[:, 2] + goal[:, 3] * pose[:, 3],
-    )
+    turn = turn_between(goal, pose)
     after = _errors(x, y, turn, known.motion)  # [n, k, angles, lengths]
     length = np.argmin(after, axis=3)
     least = after.min(axis=3)
@@ -157,7 +163,7 @@ def push_t(observation: dict[str, Array]) -> Array:
     to_contact = np.sqrt(np.sum((own[:, None] - known.contact) ** 2, axis=2))
     touching = to_contact < _CLOSE
     far = np.where(touching, to_contact, np.minimum(around, 1.0) + _GAP)
-    now = np.sqrt(x * x + y * y + 2.0 * GYRATION**2 * (1.0 - np.cos(turn)))
+    now = pose_distance(x, y, turn)
     score = least + (_TRAVEL * now[:, None] * far)[:, :, None]
     score = np.where(least < 0.9 * now[:, None, None], score, least + 1.0)
     best = np.argmin(score.reshape(len(n), -1), axis=1)
@@ -197,5 +203,4 @@ def _errors(x: Array, y: Array, turn: Array, motion: Array) -> Array:
     dy = q * motion[..., 0, None] + p * motion[..., 1, None]
     shape = (len(x), 1, 1, 1)
     x, y, turn = x.reshape(shape), y.reshape(shape), turn.reshape(shape)
-    square = (x - dx) ** 2 + (y - dy) ** 2 + 2.0 * GYRATION**2 * (1.0 - np.cos(turn - a))
-    return np.sqrt(square)
+    return pose_distance(x - dx, y - dy, turn - a)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigid_envs.tasks.coverage import uncovered
+from rigid_envs.tasks.coverage import UNIT, uncovered
 from rigid_envs.tasks.goals import distance
 from rigid_envs.tasks.push_t import (
     FINGER_START,
@@ -70,10 +70,10 @@ def test_reward_terms_are_coverage_and_the_distance_of_the_points_of_the_t():
     np.testing.assert_allclose(info["pose"], -mean, rtol=1e-5)
 
 
-def test_radius_of_gyration_is_that_of_the_body():
-    """About the vertical axis; the height doesn't matter."""
-    (body,) = PushT().scene().bodies
-    np.testing.assert_allclose(GYRATION**2, body.shape.inertia(1.0)[2], rtol=1e-12)
+def test_radius_of_gyration_is_that_of_two_rectangles():
+    """Of each, (w^2 + h^2) / 12 and the square of its distance from the centre, in units."""
+    bar, stem = (16 + 1) / 12 + (6 / 7) ** 2, (1 + 9) / 12 + (8 / 7) ** 2
+    np.testing.assert_allclose((GYRATION / UNIT) ** 2, (4 * bar + 3 * stem) / 7, rtol=1e-12)
 
 
 def test_solved_where_nine_tenths_of_the_goal_are_covered():
