@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from benchmarks.draw.figure import GRID, INK
 from benchmarks.trade.fronts import WORLDS, front, rate
@@ -77,6 +78,8 @@ def draw(
 def _panel(axes: Axes, rows: Sequence[Row], worlds: str) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):  # within one decade the labels would overlap
+        axis.set_minor_formatter(NullFormatter())
     axes.margins(y=0.12)
     axes.grid(True, color=GRID, linewidth=0.7)
     axes.set_axisbelow(True)
@@ -95,7 +98,8 @@ def _panel(axes: Axes, rows: Sequence[Row], worlds: str) -> None:
         axes.plot(*_points(points, worlds), color=color, **SETTING)  # type: ignore[arg-type]
     for engine, color in ENGINES.items():
         best = front(rows, engine, worlds)
-        axes.plot(*_points(best, worlds), color=color, linewidth=2.2)
+        mark = "o" if len(best) == 1 else ""
+        axes.plot(*_points(best, worlds), marker=mark, color=color, linewidth=2.2)
     for row in curves.get((OURS, "presets"), ()):
         x, y = rate(row, worlds), max(row.error, LEAST)
         axes.plot([x], [y], "o", color=INK, markerfacecolor="white", markersize=5, zorder=5)

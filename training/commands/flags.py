@@ -217,6 +217,13 @@ def add_dataset(parser: argparse.ArgumentParser) -> None:
         help="name in Minari (default: of environment and policy, as rigid-envs/push/scripted-v0)",
     )
     parser.add_argument("--seed", type=whole, help="seed of the first episode (default: 2000000)")
+    parser.add_argument(
+        "--action-noise",
+        type=float,
+        default=0.0,
+        metavar="DEVIATION",
+        help="standard deviation of noise on the actions (default: 0)",
+    )
     parser.add_argument("--replace", action="store_true", help="replace a dataset of the same name")
     add_environment(parser)
     # a model.zip is not accepted: it would have to be unpickled

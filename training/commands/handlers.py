@@ -239,6 +239,7 @@ def dataset(options: argparse.Namespace) -> int:
         options.n_episodes,
         options.dataset_id,
         seed=minari_store.FIRST_SEED if options.seed is None else options.seed,
+        action_noise=options.action_noise,
         replace_existing=options.replace,
         **kwargs,
     )

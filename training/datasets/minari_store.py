@@ -104,6 +104,7 @@ def write_dataset(
     dataset_id: str | None = None,
     *,
     seed: int = FIRST_SEED,
+    action_noise: float = 0.0,
     replace_existing: bool = False,
     report: Callable[[int], None] = lambda _: None,
     **env_kwargs: Any,
@@ -115,6 +116,9 @@ def write_dataset(
         episodes: their number.
         dataset_id: (namespace/)name-v0; by default from the environment and the policy.
         seed: of the first episode.
+        action_noise: standard deviation of normal noise on the actions. What is recorded is what
+            the environment took, clipped to its bounds; so the episodes also show how the policy
+            corrects errors.
         replace_existing: whether a dataset of this name may be replaced.
         report: called with the number of episodes that have ended.
         env_kwargs: arguments of the environment that replace those of the policy.
@@ -126,6 +130,8 @@ def write_dataset(
     start = time.perf_counter()
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
+    if not 0.0 <= action_noise < np.inf:
+        raise UsageError(f"action_noise is {action_noise}, should be a number of at least 0")
     name = default_id(policy.env_id, policy.name) if dataset_id is None else dataset_id
     if not _NAME.fullmatch(name):
         raise UsageError(
@@ -133,15 +139,29 @@ def write_dataset(
         )
     arguments = {**policy.env_kwargs, **env_kwargs}
     with _place(name, replace_existing) as path:
-        recorded = _play(policy, episodes, seed, arguments, report)
+        noisy = _with_noise(policy, action_noise, seed)
+        recorded = _play(noisy, episodes, seed, arguments, report)
         low, high = _scores(policy, arguments)
-        _write(name, policy, arguments, recorded, low, high)
+        _write(name, noisy, arguments, recorded, low, high)
     returns = [float(one.rewards.sum(dtype=float)) for one in recorded]
     return Written(
         name, path, episodes, sum(len(one.rewards) for one in recorded),
         float(np.mean([one.success[-1] for one in recorded])), float(np.mean(returns)),
         low, high, time.perf_counter() - start,
     )  # fmt: skip
+
+
+def _with_noise(policy: Policy, deviation: float, seed: int) -> Policy:
+    """The policy, with normal noise on its actions; the same noise for the same seed."""
+    if deviation == 0.0:
+        return policy
+    draw = np.random.default_rng(seed)
+
+    def act(observation: dict[str, Array]) -> Array:
+        action = np.asarray(policy.act(observation))
+        return action + deviation * draw.standard_normal(action.shape)
+
+    return replace(policy, act=act, name=f"{policy.name} with action noise {deviation:g}")
 
 
 def _play(

@@ -1,4 +1,9 @@
-"""A controller for Stack with any number of cubes."""
+"""A controller for Stack with any number of cubes.
+
+It is smooth where it can be: the path to a place is a funnel, whose height grows with the
+horizontal distance, and errors are corrected on the way down. So it solves Stack with noise on its
+actions, too, and can be imitated.
+"""
 
 import numpy as np
 
@@ -7,23 +12,30 @@ from rigid_envs.tasks.stack import Stack
 
 Array = np.ndarray
 
-# m, distance from its goal at which a cube counts as placed; m, tolerance of the hand over a place
-_PLACED, _OVER = 0.017, 0.004
-# m, height above its support at which a cube rests on it
-_RESTS = 0.001
-# m, sideways tolerance at which a cube is lowered; m, height above the tower until then
-_ALIGNED, _ABOVE = 0.0003, 0.003
-# m, target depth below the final place, to press the cube down; m/s, speed of a cube at rest
-_PRESS, _STILL = 0.004, 0.01
+# m, distance from its goal and height above its support at which a cube counts as placed
+_PLACED, _RESTS = 0.017, 0.003
 # m, opening beyond a cube's width: below it the fingers hold the cube; above it they are clear
 _HOLDS, _CLEAR_OPENING = 0.003, 0.014
 # m, least height of the pads above the bottom of a cube, so that they miss a wider cube under it
 _FOOT = 0.003
 # m, clearance above all cubes at which pads or a carried cube move sideways
 _CLEAR = 0.015
-# m/s
-_SLOW = 0.2
+# height per horizontal distance beyond the width of the funnel; m, that width for the open hand
+# and for a carried cube
+_SLOPE, _HAND_FUNNEL, _CUBE_FUNNEL = 2.0, 0.01, 0.015
+# m, horizontal error at which a cube is released: of two cubes, and of higher towers, which fall
+# if their cubes are not in line
+_ALIGNED, _IN_LINE = 0.005, 0.0003
+# m, above its place and below it, to which a cube is lowered before and after it is aligned
+_HOVER, _PRESS = 0.004, 0.002
+# m and m/s, height above its place and speed of the hand at which a cube is released
+_LOW, _SLOW = 0.005, 0.2
 OPEN, CLOSE = 1.0, -1.0
+
+# The servo is critically damped: after a step of T the hand is d (1 + w T) exp(-w T) +
+# v T exp(-w T) from its reference, where d is its distance and v its velocity now
+_TURN = Hand.SERVO_FREQUENCY * Stack.frame
+_KEPT, _GLIDE = (1.0 + _TURN) * np.exp(-_TURN), Stack.frame * np.exp(-_TURN)
 
 
 def stack(observation: dict[str, Array]) -> Array:
@@ -41,59 +53,52 @@ def stack(observation: dict[str, Array]) -> Array:
     worlds, goals = np.arange(count), goals.reshape(count, n, 3)
     hand, velocity = values[:, 0:3], values[:, 3:6]
     opening, reference = values[:, 6], values[:, 8:11]
-    states = values[:, len(Hand.bounds) :].reshape(count, n, -1)
-    cubes, motion = states[:, :, 0:3], states[:, :, 7:10]
+    cubes = values[:, len(Hand.bounds) :].reshape(count, n, -1)[:, :, 0:3]
 
     halves = _half_widths(goals)
     tops = cubes[:, :, 2] + halves
     support = np.concatenate([np.zeros((count, 1)), tops[:, :-1]], axis=1)
+    # where the hand grasps each cube: lower pads would touch the ground or the cube below
+    grasps = cubes.copy()
+    grasps[:, :, 2] += np.maximum(Hand.PAD + _FOOT - halves, 0.0)
+    held = np.abs(hand[:, None] - grasps).max(axis=2) < 0.75 * halves
+    held &= opening[:, None] < 2.0 * halves + _HOLDS
     rests = cubes[:, :, 2] - halves - support < _RESTS
-    placed = rests & (np.sqrt(np.sum((cubes - goals) ** 2, axis=-1)) < _PLACED)
+    placed = rests & (np.sqrt(np.sum((cubes - goals) ** 2, axis=2)) < _PLACED) & ~held
     done = placed.all(axis=1)
     which = np.where(done, 0, np.argmin(placed, axis=1))
-    cube, goal, half = cubes[worlds, which], goals[worlds, which], halves[worlds, which]
-    # where the hand grasps it: lower pads would touch the ground or the cube below
-    grasp = cube.copy()
-    grasp[:, 2] += np.maximum(Hand.PAD + _FOOT - half, 0.0)
-    near = np.abs(hand - grasp).max(axis=1) < 0.75 * half
-    holds = near & (opening < 2.0 * half + _HOLDS) & ~done
+    cube, half, holds = cubes[worlds, which], halves[worlds, which], held[worlds, which]
+    place = goals[worlds, which]
+    on_tower = which > 0  # whose top is where the tower is
+    place[on_tower, :2] = cubes[worlds, which - 1][on_tower, :2]
+    place[on_tower, 2] = (tops[worlds, which - 1] + half)[on_tower]
 
-    # with a cube: up, sideways, down, open
-    below = goal.copy()
-    on_tower = which > 0
-    below[on_tower, :2] = cubes[worlds, which - 1][on_tower, :2]
-    carried_cube = holds[:, None] & (np.arange(n) == which[:, None])
-    top = np.where(carried_cube, 0.0, tops).max(axis=1)
-    target, grip = hand.copy(), np.full(count, OPEN)
-    still = np.abs(motion[worlds, which]).max(axis=1) < _STILL
-    off = np.sqrt(np.sum((cube - below)[:, :2] ** 2, axis=1))
-    aligned = off < np.where(cube[:, 2] < goal[:, 2] + 2.0 * _ABOVE, _ALIGNED, _OVER)
-    low = aligned & (cube[:, 2] < goal[:, 2] + 0.001) & still
-    height = np.maximum(top + half, goal[:, 2]) + _CLEAR
-    slow = np.abs(velocity[:, :2]).max(axis=1) < _SLOW
-    up = holds & ((off > 2.0 * _OVER) | ~slow) & ~(aligned & (cube[:, 2] < height - _CLEAR))
-    grip[up | (holds & ~low)] = CLOSE
-    target[up, 2] = (height + hand[:, 2] - cube[:, 2])[up]
-    sideways = up & (cube[:, 2] > height - 0.5 * _CLEAR)
-    target[sideways, :2] += (below - cube)[sideways, :2]
-    down = holds & ~up & ~low
-    target[down] += (below - cube)[down]
-    target[down, 2] += np.where(aligned, -_PRESS, _ABOVE)[down]
-    # without a cube: clear of all cubes, up, sideways, down, close
-    free = ~holds & (opening > 2.0 * half + _CLEAR_OPENING)
-    travel = top + Hand.PAD + _CLEAR
-    over = np.sqrt(np.sum((cube - hand)[:, :2] ** 2, axis=1)) < _OVER
-    over &= np.abs(velocity[:, :2]).max(axis=1) < _SLOW
-    at_grasp = over & (np.abs(hand[:, 2] - grasp[:, 2]) < _OVER) & ~done
-    rise = free & (~over | done)
-    target[rise, 2] = travel[rise]
-    sideways = rise & ~done & (hand[:, 2] > travel - 0.5 * _CLEAR)
-    target[sideways, :2] = cube[sideways, :2]
-    fetch = free & over & ~done
-    target[fetch] = grasp[fetch]
-    grip[~holds & at_grasp] = CLOSE
+    # either the cube moves to its place, or the open hand to the cube
+    start = np.where(holds[:, None], cube, hand)
+    end = np.where(holds[:, None], place, grasps[worlds, which])
+    move = np.where(done[:, None], 0.0, end - start)
+    off = np.hypot(*move[:, :2].T)
+    others = np.where(holds[:, None] & (np.arange(n) == which[:, None]), 0.0, tops)
+    level = np.maximum(others.max(axis=1) + np.where(holds, half, Hand.PAD), end[:, 2]) + _CLEAR
+    funnel = np.where(holds, _CUBE_FUNNEL, _HAND_FUNNEL)
+    height = np.minimum(end[:, 2] + _SLOPE * np.maximum(off - funnel, 0.0), level)
+    height[done] = level[done]
+    # a cube is released where it will be aligned, if it does not move fast
+    drift = (1.0 - _KEPT) * (reference - hand) + _GLIDE * velocity
+    ahead = np.hypot(*(move - drift)[:, :2].T)
+    aligned = np.maximum(off, ahead) < (_ALIGNED if n == 2 else _IN_LINE)
+    height[holds] += np.where(aligned, -_PRESS, _HOVER)[holds]
+    slow = np.abs(velocity).max(axis=1) < _SLOW
+    releases = holds & aligned & slow & (cube[:, 2] < place[:, 2] + _LOW)
 
-    strides = np.clip((target - reference) / Stack.hand.stride, -1.0, 1.0)
+    # sideways only above what is in the way
+    move[:, :2] *= np.clip((start[:, 2] - height) / (0.5 * _CLEAR) + 1.0, 0.0, 1.0)[:, None]
+    grasping = ~holds & ~done & (off < _HAND_FUNNEL) & (np.abs(move[:, 2]) < _HAND_FUNNEL)
+    move[:, 2] = height - start[:, 2]
+    opens = ~holds & (opening < 2.0 * half + _CLEAR_OPENING)
+    move[opens | releases] = 0.0
+    strides = np.clip((hand + move - reference) / Stack.hand.stride, -1.0, 1.0)
+    grip = np.where((holds & ~releases) | grasping, CLOSE, OPEN)
     return np.concatenate([strides, grip[:, None]], axis=1)
 
 

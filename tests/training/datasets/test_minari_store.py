@@ -92,6 +92,24 @@ def test_scores_are_those_of_random_actions_and_of_the_policy():
     assert drawn.mean_return < 0.5 * written.mean_return
 
 
+def test_noise_on_actions_is_recorded_as_the_environment_took_it():
+    policy = scripted_policy(PUSH, **FAST)
+    plain = write_dataset(policy, 20, "plain-v0")
+    noisy = write_dataset(policy, 20, "noisy-v0", action_noise=0.3)
+    write_dataset(policy, 20, "again-v0", action_noise=0.3)
+    first, second, third = (
+        minari.load_dataset(f"{name}-v0") for name in ("plain", "noisy", "again")
+    )
+    actions, other, same = (np.stack([e.actions for e in d]) for d in (first, second, third))
+    np.testing.assert_array_equal(other, same)
+    assert np.abs(other).max() == 1.0  # clipped
+    drawn = other[:, 0] - actions[:, 0]  # of the same observations
+    inside = np.abs(other[:, 0]) < 1.0
+    assert 0.2 < drawn[inside].std() < 0.4
+    assert second.storage.metadata["algorithm_name"] == "scripted with action noise 0.3"
+    assert noisy.high_score == plain.high_score  # the expert's, without noise
+
+
 def test_a_dataset_is_replaced_only_if_asked(folder):
     policy = random_policy(PUSH, **FAST)
     write_dataset(policy, 2)
@@ -138,6 +156,8 @@ def test_names(name, env_id, policy, expected):
         (["--dataset-id", "no version"], "name of the dataset is 'no version', should be like"),
         (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--episodes", "0"], "should be an integer of at least 1"),
+        (["--action-noise", "-0.1"], "action_noise is -0.1, should be a number of at least 0"),
+        (["--action-noise", "nan"], "action_noise is nan, should be a number of at least 0"),
         (["--policy", "nowhere"], "nowhere"),
         (["--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
         (["--env-kwargs", "fidelity:quick"], "quick"),
