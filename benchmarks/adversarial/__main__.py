@@ -35,9 +35,9 @@ CHUNK = 500  # steps of all worlds, at most: 2 million
 COMPARED = 5  # one chunk in so many is compared with a few worlds by themselves
 # steps of a combination in proportion to its speed, so that all take about as long
 SHARES: dict[str, dict[str, float]] = {
-    "push": {"fast": 24, "balanced": 24, "accurate": 3, "solid": 6},
-    "stack": {"fast": 9, "balanced": 8, "accurate": 0.6, "solid": 0.4},
-    "throw": {"fast": 24, "balanced": 20, "accurate": 4, "solid": 12},
+    "push": {"fast": 24, "balanced": 24, "accurate": 2.5, "solid": 5},
+    "stack": {"fast": 5, "balanced": 4, "accurate": 0.54, "solid": 0.35},
+    "throw": {"fast": 24, "balanced": 20, "accurate": 3.5, "solid": 10},
 }
 
 
