@@ -112,7 +112,7 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
         for i, dynamic in enumerate(model.dynamic):
             block = slice(6 * i, 6 * i + 3)
             A[block, block] += servo_load(dynamic, h) * np.eye(3)
-        return largest_eigenvalue(inverse, A)
+        return float(largest_eigenvalue(inverse, A))
 
     return root(load)
 
@@ -160,9 +160,13 @@ def _of_dynamic_body(
             partners.setdefault((other, met[ends]), []).append(half_pair)
             met[ends] += 1
     ways = {other: ((i, other) in met) + ((other, i) in met) for other, _ in partners}
+    along, across = (np.array(parts) for parts in zip(*faces, strict=True))  # [faces, 6, 6]
 
     def load(h: float) -> float:
-        each = []
+        at_servo = servo_load(this, h) * float(this["inverse_mass"])
+        if features.impulse:  # its contacts are stable at any step
+            return at_servo
+        loads = []  # along, across and about the normal, of each partner
         for (other, _), half_pairs in partners.items():
             # two solids that both carry samples share their stiffness between two half-pairs
             fraction = 1.0 / ways[other]
@@ -170,11 +174,11 @@ def _of_dynamic_body(
                 fraction *= 1.0 + model.dynamic[other]["inverse_mass"] / this["inverse_mass"]
             normal = fraction * sum(normal_load(row, features.dashpot, h) for row in half_pairs)
             shear = fraction * sum(shear_load(row, features.viscous, h) for row in half_pairs)
-            twist = fraction * sum(twist_load(row, h) for row in half_pairs) * _TURN
-            loads = (normal * n + shear * t + twist for n, t in faces)
-            each.append(max(largest_eigenvalue(inverse, A) for A in loads))
-        if features.impulse:  # its contacts are stable at any step
-            each = []
-        return float(sum(sorted(each)[-_PARTNERS:]) + servo_load(this, h) * this["inverse_mass"])
+            twist = fraction * sum(twist_load(row, h) for row in half_pairs)
+            loads.append((normal, shear, twist))
+        normal, shear, twist = np.array(loads).reshape(-1, 3).T[..., None, None, None]
+        A = normal * along + shear * across + twist * _TURN  # [partners, faces, 6, 6]
+        each = largest_eigenvalue(inverse, A).max(axis=1)
+        return float(sum(sorted(each)[-_PARTNERS:]) + at_servo)
 
     return root(load)

@@ -24,9 +24,9 @@ def point_jacobian(arm: Array) -> Array:
     )
 
 
-def largest_eigenvalue(inverse_mass: Array, A: Array) -> float:
-    """Largest eigenvalue of M^-1 A, both symmetric and positive semidefinite."""
-    return float(np.linalg.eigvals(inverse_mass @ A).real.max(initial=0.0))
+def largest_eigenvalue(inverse_mass: Array, A: Array) -> Array:
+    """Largest eigenvalue [...] of M^-1 A [..., n, n], both symmetric and positive semidefinite."""
+    return np.asarray(np.linalg.eigvals(inverse_mass @ A).real.max(axis=-1, initial=0.0))
 
 
 def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
@@ -69,8 +69,8 @@ def fastest_modes(shape: Shape, spacing: float) -> tuple[float, float]:
     inverse = np.diag([1.0] * 3 + list(1.0 / shape.inertia(1.0)))
     along, across = 1.0, 1.0
     for n, t in face_contacts(shape, spacing):
-        along = max(along, largest_eigenvalue(inverse, n))
-        across = max(across, largest_eigenvalue(inverse, t))
+        along = max(along, float(largest_eigenvalue(inverse, n)))
+        across = max(across, float(largest_eigenvalue(inverse, t)))
     return along, across
 
 
