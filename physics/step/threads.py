@@ -34,7 +34,8 @@ def _after_fork() -> None:
     _team_lock = threading.Lock()
 
 
-os.register_at_fork(after_in_child=_after_fork)
+if hasattr(os, "register_at_fork"):  # Windows has no fork
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def default_threads() -> int:

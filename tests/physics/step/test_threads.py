@@ -1,6 +1,8 @@
 """Blocks cover every world once, on as many threads as asked for, in a forked child as well."""
 
 import multiprocessing
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -62,3 +64,9 @@ def test_several_python_threads_advance_worlds_at_once():
     for worker in workers:
         worker.join(timeout=60)
     assert heights == [fall()] * 4
+
+
+def test_a_system_without_fork_can_import_the_package():
+    """As Windows; the libraries have their own tests for that."""
+    program = "import os, numba, gymnasium; del os.register_at_fork; import physics, rigid_envs"
+    subprocess.run([sys.executable, "-c", program], check=True)
