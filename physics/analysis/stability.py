@@ -37,6 +37,8 @@ Array = np.ndarray
 # eigenvalue at which a mode that flips becomes unstable
 _FLIP = 2.0
 _LONGEST = 1e3  # s, a step beyond which nothing counts as a limit
+_PRECISION = 1e-10  # of a step, relative
+_MOST = 1e300  # a load beyond it counts as this, as does one that is not finite
 # solids that can touch a body at once, all on faces: a cube has six
 _PARTNERS = 6
 _TURN = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
@@ -84,14 +86,32 @@ def servo_load(dynamic: Any, h: float) -> float:
 
 
 def root(load: Callable[[float], float]) -> float:
-    """Step in s at which a load that grows with the step reaches the limit; inf if it doesn't."""
-    if load(_LONGEST) < _FLIP:
+    """Step in s at which a load that grows with the step reaches the limit; inf if it doesn't.
+
+    By regula falsi between logarithms, in which loads are nearly straight. An end that stays counts
+    half at each further step (the Illinois rule), so that both ends come close.
+    """
+
+    def excess(x: float) -> float:
+        return math.log(max(min(_MOST, load(math.exp(x))), 1.0 / _MOST) / _FLIP)
+
+    ends = [math.log(1e-12), math.log(_LONGEST)]
+    values = [excess(x) for x in ends]
+    if values[1] < 0.0:
         return math.inf
-    low, high = 1e-12, _LONGEST
-    for _ in range(60):  # in ratios: 1e15 to 1e-3 of a percent
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if load(middle) < _FLIP else (low, middle)
-    return low
+    moved = -1
+    while ends[1] - ends[0] > _PRECISION:
+        low, high = ends
+        middle = low + (high - low) * values[0] / (values[0] - values[1])
+        margin = 0.25 * _PRECISION  # beyond the root, once that is found
+        middle = min(max(middle, low + margin), high - margin)
+        value = excess(middle)
+        end = int(value >= 0.0)
+        ends[end], values[end] = middle, value
+        if end == moved:
+            values[1 - end] *= 0.5
+        moved = end
+    return math.exp(ends[0])
 
 
 def of_contacts(model: Model, features: Features, state: State, world: int) -> float:
