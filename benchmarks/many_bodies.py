@@ -5,8 +5,8 @@ PyBullet on the same scene, one after the other on one core.
 """
 
 import argparse
+import contextlib
 import json
-import resource
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -122,8 +122,11 @@ def run() -> None:
     print(describe(provenance()))
     for table in tables(options.threads, options.pybullet):
         print(plain(table), flush=True)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"peak memory of this process {peak:.0f} MB")
+    with contextlib.suppress(ImportError):  # Windows has no such module
+        import resource
+
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"peak memory of this process {peak:.0f} MB")
 
 
 if __name__ == "__main__":

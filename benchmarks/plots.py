@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.draw import env_steps, scenes, tasks, trade
+from benchmarks.draw import env_steps, pixels, scenes, tasks, trade
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.results_file import load
 from benchmarks.report.tables import Table
@@ -35,6 +35,7 @@ PLOTS = {
 # the animation of all tasks, and frames of an episode of each
 FILM = ROOT / "docs/images/tasks.gif"
 SCENES = ROOT / "docs/images/scenes.png"
+PIXELS = ROOT / "docs/images/pixels.png"
 # plots of docs/trade/trade.csv: their trials
 TRADE = {
     ROOT / "docs/images/trade.png": (
@@ -49,7 +50,7 @@ TRADE = {
 
 def run() -> None:
     """Draws all pictures, or those named."""
-    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS, "scenes"]
+    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS, "scenes", "pixels"]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
     options = parser.parse_args()
@@ -61,6 +62,8 @@ def run() -> None:
             tasks.draw_film(path := FILM)
         elif name == "scenes":
             scenes.draw(path := SCENES)
+        elif name == "pixels":
+            pixels.draw(path := PIXELS)
         elif name in tasks.STRIPS:
             tasks.draw_strip(name, path := ROOT / f"docs/images/{name}.png")
         elif name == "trade":

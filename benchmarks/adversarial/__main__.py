@@ -33,7 +33,7 @@ PRESETS = ("fast", "balanced", "accurate", "solid")
 WORLDS = 4096
 CHUNK = 500  # steps of all worlds, at most: 2 million
 COMPARED = 5  # one chunk in so many is compared with a few worlds by themselves
-# steps of a combination in proportion to its speed, so that all take about as long
+# steps of a combination, roughly in proportion to its speed with the parameters of the scene
 SHARES: dict[str, dict[str, float]] = {
     "push": {"fast": 24, "balanced": 24, "accurate": 2.5, "solid": 5},
     "stack": {"fast": 5, "balanced": 4, "accurate": 0.54, "solid": 0.35},

@@ -1,6 +1,6 @@
-"""Pictures of the tasks: frames of an episode in a row, and an animation of three tasks.
+"""Pictures of the tasks: frames of an episode in a row, and an animation of all tasks.
 
-Trained policies of results/ play; the tower of three is built by the scripted controller.
+Trained policies of results/ play; the scripted controllers build the tower of three and push the T.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ class Strip(NamedTuple):
 
 
 STRIPS = {
-    "push": Strip("Push", 1_000_000, (0, 5, 12), {}),
+    "push": Strip("Push", 1_000_008, (0, 6, 12, 20), {}),
     "pusht": Strip("PushT", 1_000_000, (0, 12, 30, 60), {"fidelity": "balanced"}),
     "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),
     "slide": Strip("Slide", 1_000_000, (0, 5, 12, 30), {}),
@@ -48,9 +48,13 @@ STRIPS = {
 }
 SIZE = 360  # pixels of a strip's frame
 
-# the animation: how many steps are shown of each task's episodes
-FILM_STEPS, FILM_LENGTH = {"Push": 16, "Stack": 48, "Throw": 24}, 96
-FILM_SIZE, FILM_FPS = 300, 25.0
+# the animation: rows of tasks, and how many steps are shown of each task's episodes
+FILM = (
+    {"Push": 16, "Stack": 48, "Throw": 24},
+    {"PushT": 48, "Reach": 12, "Slide": 32},
+)
+FILM_LENGTH = 96
+FILM_SIZE, FILM_FPS, FILM_COLOURS = 260, 25.0, 128
 
 
 def draw_strip(name: str, path: Path) -> None:
@@ -66,21 +70,29 @@ def draw_strip(name: str, path: Path) -> None:
 
 
 def draw_film(path: Path) -> None:
-    """Writes a GIF of the three tasks side by side."""
-    columns = [
-        [
-            frame
-            for k in range(FILM_LENGTH // steps)
-            for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1:]
-        ]
-        for task, steps in FILM_STEPS.items()
-    ]
-    gap = np.full((FILM_SIZE, GAP, 3), 255, np.uint8)
+    """Writes a GIF of all tasks, in rows."""
+    films = np.array([[_film(task, steps) for task, steps in row.items()] for row in FILM])
+    rows, columns, length = films.shape[:3]
+    pitch = FILM_SIZE + GAP
+    width = columns * pitch - GAP
+    pictures = np.full((length, rows * pitch - GAP, width, 3), 255, np.uint8)
+    for row, column in np.ndindex(rows, columns):
+        top, left = row * pitch, column * pitch
+        pictures[:, top : top + FILM_SIZE, left : left + FILM_SIZE] = films[row, column]
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer = GifWriter(path, FILM_FPS, 3 * (FILM_SIZE + GAP))
-    for left, middle, right in zip(*columns, strict=True):
-        writer.append_data(np.concatenate([left, gap, middle, gap, right], axis=1))
-    writer.close()
+    with GifWriter(path, FILM_FPS, width, FILM_COLOURS) as writer:
+        for picture in pictures:
+            writer.append_data(picture)
+
+
+def _film(task: str, steps: int) -> list[Array]:
+    """FILM_LENGTH frames: `steps` of each of several episodes."""
+    arguments = STRIPS[task.lower()].arguments if task == "PushT" else {}
+    return [
+        frame
+        for k in range(FILM_LENGTH // steps)
+        for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE, **arguments))[1:]
+    ]
 
 
 def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:

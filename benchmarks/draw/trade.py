@@ -98,7 +98,7 @@ def _panel(axes: Axes, rows: Sequence[Row], worlds: str) -> None:
         axes.plot(*_points(points, worlds), color=color, **SETTING)  # type: ignore[arg-type]
     for engine, color in ENGINES.items():
         best = front(rows, engine, worlds)
-        mark = "o" if len(best) == 1 else ""
+        mark = "o" if len(best) == 1 else ""  # a front of one setting has no line
         axes.plot(*_points(best, worlds), marker=mark, color=color, linewidth=2.2)
     for row in curves.get((OURS, "presets"), ()):
         x, y = rate(row, worlds), max(row.error, LEAST)

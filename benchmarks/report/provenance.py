@@ -32,7 +32,7 @@ def provenance() -> dict[str, Any]:
             "cores": default_threads(),
             "threads": THREADS,
             # a load above the number of cores means that other programs slow the benchmarks down
-            "load": round(os.getloadavg()[0], 2),
+            "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else "unknown",
         },
         "versions": versions,
     }

@@ -1,11 +1,14 @@
 """Cameras by name, and cameras from what a user gives."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigid_envs.rendering.camera import Camera
+
+if TYPE_CHECKING:
+    from rigid_envs.tasks.task import Task
 
 Array = np.ndarray
 
@@ -15,23 +18,25 @@ FIELDS = ("position", "target", "field_of_view")
 FOLLOW = "follow"  # the own camera, which moves along with a place
 NEAR = 0.6  # of its own distance
 AHEAD = 1.0 / 3.0  # where it looks: of the way from the place to the goal
-USED = 0.85  # of the picture, in which both are
+USED = 0.85  # of the picture, in which both are, or all of a workspace
 LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 
-def choose_camera(given: Any, own: Camera) -> Camera:
+def choose_camera(given: Any, task: "Task") -> Camera:
     """A camera from a name, from settings, or the task's own.
 
     Args:
-        given: None, "task" or "follow": `own`, which `following` moves; one of `NAMED`: the same
-            target, distance and field of view from another side; a Camera; or a dict with some of
-            `FIELDS`, the others being those of `own`.
-        own: the task's camera.
+        given: None, "task" or "follow": the task's camera, which `following` moves; one of `NAMED`:
+            the same target, distance and field of view from another side, or, of a task with a
+            workspace, as near as all of that is seen; a Camera; or a dict with some of `FIELDS`,
+            the others being those of the task's camera.
+        task: whose camera and workspace.
 
     Raises:
         TypeError: none of these, or a value of another type.
         ValueError: an unknown name or field, or a value out of its range.
     """
+    own = task.camera
     if given is None or isinstance(given, Camera):
         return given or own
     if isinstance(given, str):
@@ -41,6 +46,8 @@ def choose_camera(given: Any, own: Camera) -> Camera:
             names = ", ".join(map(repr, ("task", FOLLOW, *NAMED)))
             raise ValueError(f"camera must be one of {names}, got {given!r}")
         azimuth, elevation = NAMED[given]
+        if task.workspace:
+            return looking_at(*task.workspace, azimuth, elevation, USED)
         return Camera.around(own.target, own.distance, azimuth, elevation, own.field_of_view)
     if not isinstance(given, Mapping):
         raise TypeError(
@@ -72,7 +79,9 @@ def following(
     return Camera.around(around, distance, own.azimuth, elevation, own.field_of_view)
 
 
-def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0) -> Camera:
+def looking_at(
+    low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0, used: float = 1.0
+) -> Camera:
     """A camera whose square picture shows a box, from as near as it can.
 
     Args:
@@ -80,6 +89,7 @@ def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 3
         high: (3,) m, greatest coordinates.
         azimuth: degrees, see `Camera.around`.
         elevation: degrees, likewise.
+        used: fraction of the picture within which the box is to be.
     """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     corners = low + (high - low) * np.array(
@@ -87,7 +97,7 @@ def looking_at(low: Any, high: Any, azimuth: float = -65.0, elevation: float = 3
     )
     target = tuple((0.5 * (low + high)).tolist())
     view = Camera.around(target, 1.0, azimuth, elevation)
-    return Camera.around(target, _fitting(view, corners), azimuth, elevation)
+    return Camera.around(target, _fitting(view, corners, used), azimuth, elevation)
 
 
 def _fitting(view: Camera, points: Array, used: float = 1.0, shape: float = 1.0) -> float:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 RENDER_MODES = ("rgb_array", "human")
+SIZE = 480  # pixels, width and height of a frame
 FPS = 25
 WINDOW = 960  # pixels, widest that a window of many worlds gets
 LEAST, MOST = 16, 4096  # pixels, width or height of a frame
@@ -27,6 +28,8 @@ LEAST, MOST = 16, 4096  # pixels, width or height of a frame
 
 class Pictures:
     """Draws worlds, off screen or in a window. Only a window needs pygame.
+
+    Warns if a size of frames is given where only observed pixels are drawn.
 
     Args:
         runner: whose worlds.
@@ -46,8 +49,8 @@ class Pictures:
         self,
         runner: "Runner",
         mode: str | None,
-        width: int = 480,
-        height: int = 480,
+        width: int = SIZE,
+        height: int = SIZE,
         camera: Any = None,
         show_forces: bool = False,
         show_particles: bool = False,
@@ -61,13 +64,18 @@ class Pictures:
         self._show_particles: bool = instance("show_particles", show_particles, bool)
         self._width = integer("width", width, low=LEAST, high=MOST)
         self._height = integer("height", height, low=LEAST, high=MOST)
-        self.camera = choose_camera(camera, runner.task.camera)
+        self.camera = choose_camera(camera, runner.task)
         self._follows = isinstance(camera, str) and camera == FOLLOW
         self._floor = scene_view.floor(runner.world.scene).height
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)
         self._renderer: Renderer | None = None
         self._window: Window | None = None
         self._warned = False
+        if mode is None and runner.pixels is not None and (width, height) != (SIZE, SIZE):
+            gym.logger.warn(
+                f"width={width} and height={height} are of frames of render(), which needs a "
+                "render_mode; the size of observed pixels is pixel_size=..."
+            )
 
     def frames(self) -> tuple[Array, ...]:
         """Pictures [height, width, 3] uint8 of the first worlds."""

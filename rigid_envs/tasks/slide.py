@@ -28,6 +28,7 @@ class Slide(Task):
     finger = Finger((-0.15, 0.0, 0.05), (-0.25, -0.2, Finger.RADIUS), (0.2, 0.2, 0.15), 0.05)
     # from behind, so that the finger and the puck are near
     camera = Camera.around((0.28, 0.04, -0.15), 1.45, -165.0, 37.0, field_of_view=36.0)
+    workspace = ((-0.25, -0.36, 0.0), (0.85, 0.36, 0.15))
 
     actions = finger.actions
     bounds = (

@@ -16,6 +16,7 @@ from rigid_envs.rendering.view import Goal, Marker
 from rigid_envs.tasks.rewards import Reward
 
 Array = np.ndarray
+Point = tuple[float, float, float]
 Bounds = tuple[tuple[str, str, float, float], ...]
 """(name, unit, low, high) of each component of an array."""
 
@@ -36,6 +37,8 @@ class Task(ABC):
         draw_count: how many random numbers the start of an episode needs.
         reward: the success threshold and the weights of the dense reward.
         camera: the camera of rendered frames. It should see the whole workspace.
+        workspace: (low, high) in m of a box around starts and goals, which the cameras "front",
+            "side", "back" and "top" show; None if they see them from as far as `camera`.
         video_camera: the name of the camera of recorded videos: "follow" where a body is small
             compared with its path.
         size_range: smallest and largest factor of body sizes that `start` supports when each world
@@ -50,6 +53,7 @@ class Task(ABC):
     draw_count: int
     reward: Reward
     camera: Camera = Camera()
+    workspace: tuple[Point, Point] | None = None
     video_camera: str = "task"
     size_range: tuple[float, float] | None = None
 

@@ -28,6 +28,7 @@ class Throw(Task):
     hand = Hand(home=(-0.1, 0.0, 0.25), low=(-0.3, -0.2, 0.1), high=(0.3, 0.2, 0.5), stride=0.12)
     # from behind, so that the hand and the ball are near, and from the side, to show the arc
     camera = Camera.around((0.3, 0.03, 0.24), 1.9, -150.0, 20.0, field_of_view=38.0)
+    workspace = ((-0.3, -0.57, 0.0), (1.3, 0.57, 0.5))
     video_camera = "follow"
 
     actions = hand.actions

@@ -90,12 +90,13 @@ def random_policy(env_id: str, seed: int = 0, **env_kwargs: Any) -> Policy:
     return Policy(act, env_id, RANDOM, env_kwargs)
 
 
-def default_id(env_id: str, policy: str) -> str:
-    """The name of a dataset, as rigid-envs/push-dense/scripted-v0."""
+def default_id(env_id: str, policy: str, action_noise: float = 0.0) -> str:
+    """The name of a dataset, as rigid-envs/push-dense/scripted-v0 or .../scripted-noise-0-06-v0."""
     name = env_id.rpartition("/")[2].rpartition("-v")[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
     algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
-    return f"rigid-envs/{words}/{algorithm}-v0"
+    noise = f"-noise-{action_noise:g}".replace(".", "-") if action_noise else ""
+    return f"rigid-envs/{words}/{algorithm}{noise}-v0"
 
 
 def write_dataset(
@@ -116,9 +117,9 @@ def write_dataset(
         episodes: their number.
         dataset_id: (namespace/)name-v0; by default from the environment and the policy.
         seed: of the first episode.
-        action_noise: standard deviation of normal noise on the actions. What is recorded is what
-            the environment took, clipped to its bounds; so the episodes also show how the policy
-            corrects errors.
+        action_noise: standard deviation of normal noise on the actions, whose bounds are 1. What
+            is recorded is what the environment took, clipped to its bounds; so the episodes also
+            show how the policy corrects errors.
         replace_existing: whether a dataset of this name may be replaced.
         report: called with the number of episodes that have ended.
         env_kwargs: arguments of the environment that replace those of the policy.
@@ -132,7 +133,9 @@ def write_dataset(
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
     if not 0.0 <= action_noise < np.inf:
         raise UsageError(f"action_noise is {action_noise}, should be a number of at least 0")
-    name = default_id(policy.env_id, policy.name) if dataset_id is None else dataset_id
+    name = dataset_id
+    if name is None:
+        name = default_id(policy.env_id, policy.name, action_noise)
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0"
@@ -152,7 +155,7 @@ def write_dataset(
 
 
 def _with_noise(policy: Policy, deviation: float, seed: int) -> Policy:
-    """The policy, with normal noise on its actions; the same noise for the same seed."""
+    """The policy, with normal noise on its actions; the same for a seed and number of episodes."""
     if deviation == 0.0:
         return policy
     draw = np.random.default_rng(seed)

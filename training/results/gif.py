@@ -27,12 +27,14 @@ class GifWriter:
         path: The file.
         fps: Frames per second of the frames that are passed.
         width: Width in pixels; larger frames are scaled down, smaller ones are not changed.
+        colours: Largest number of colours.
     """
 
-    def __init__(self, path: Path, fps: float, width: int = WIDTH):
+    def __init__(self, path: Path, fps: float, width: int = WIDTH, colours: int = COLOURS):
         self.path = path
         self.fps = fps
         self.width = width
+        self.colours = colours
         self.received = 0
         self.frames: list[Image.Image] = []
 
@@ -52,8 +54,7 @@ class GifWriter:
             return
         every = max(1, len(self.frames) // PALETTE_SAMPLES)
         sample = np.concatenate([np.asarray(frame) for frame in self.frames[::every]])
-        # octree: a median cut uses all colours for shades of the ground, and none for a small ball
-        palette = Image.fromarray(sample).quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
+        palette = palette_of(Image.fromarray(sample), self.colours)
         first, *others = [
             frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in self.frames
         ]
@@ -80,3 +81,18 @@ class GifWriter:
     ) -> None:
         if error is None:
             self.close()
+
+
+def palette_of(sample: Image.Image, colours: int) -> Image.Image:
+    """A picture whose palette suits a sample.
+
+    Half the colours by octree, which finds those of a small ball; half by median cut, which finds
+    the many shades of the ground: with the octree's alone the horizon is ragged.
+    """
+    halves = [
+        sample.quantize(colours // 2, method=method).getpalette()
+        for method in (Image.Quantize.FASTOCTREE, Image.Quantize.MEDIANCUT)
+    ]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for half in halves for value in half or ()])
+    return palette

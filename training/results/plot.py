@@ -18,6 +18,8 @@ EXPLORING, EVALUATED = "rollout/success_rate", "eval/success_rate"
 """Success of training episodes, whose actions are sampled, and of the mean action."""
 POINTS = 200
 """Number of points at which several curves are averaged: more than the plot can resolve."""
+FEW = 5
+"""Points of a line, at most, that are marked."""
 
 Curve = list[dict[str, float]]
 """Rows of a learning curve: steps, seconds and success rates by column name."""
@@ -89,7 +91,8 @@ def draw_learning_curves(
                 axes.plot(*line, color="gray", linewidth=0.7, alpha=0.6, label=label)
             lines = evaluated
         if len(lines) == 1:
-            axes.plot(*lines[0], label="mean action" if lines is evaluated else None)
+            label = "mean action" if lines is evaluated else None
+            axes.plot(*lines[0], label=label, marker=_mark(lines[0]))
         else:
             _draw_spread(axes, lines, labels)
         axes.grid(alpha=0.3)
@@ -141,12 +144,17 @@ def _draw_spread(
     axes: Axes, lines: Sequence[tuple[np.ndarray, np.ndarray]], labels: Sequence[str]
 ) -> None:
     for line, label in zip(lines, labels, strict=True):
-        axes.plot(*line, linewidth=0.7, alpha=0.8, label=label)
+        axes.plot(*line, linewidth=0.7, alpha=0.8, label=label, marker=_mark(line))
     shared = mean_and_spread(lines)
     if shared is not None:
         points, mean, lowest, highest = shared
         axes.fill_between(points, lowest, highest, color="black", alpha=0.12, linewidth=0)
         axes.plot(points, mean, color="black", linewidth=2, label="mean")
+
+
+def _mark(line: tuple[np.ndarray, np.ndarray]) -> str:
+    """A marker for a line of few points: of a single one, nothing else would be seen."""
+    return "o" if len(line[0]) <= FEW else ""
 
 
 def read_learning_curve(folder: RunFolder) -> Curve:

@@ -95,6 +95,13 @@ class Result:
         """Algorithm and task; results of the same kind differ only in their seed."""
         return f"{self.algorithm}-{self.task}"
 
+    @property
+    def title(self) -> str:
+        """Task and algorithm for readers, as RigidEnvs/Push-v0 with randomize, PPO."""
+        changed = changed_arguments(self.env_id, self.arguments)
+        task = " with ".join([plain_id(self.env_id), *([", ".join(changed)] if changed else [])])
+        return f"{task}, {self.algorithm.upper()}"
+
     def folder(self, repository: Path) -> Path:
         """The folder of the result in the repository."""
         return repository / "results" / self.algorithm / f"{self.task}_seed{self.seed}"

@@ -115,7 +115,7 @@ def _update_images(
         draw_learning_curves(
             [read_curve(folder / "progress.csv") for folder in folders],
             repository / curve,
-            title=f"{group[0].env_id}, {group[0].algorithm}",
+            title=group[0].title,
             labels=[f"seed {result.seed}" for result in group],
         )
         report(f"plotted  {curve}")

@@ -134,10 +134,8 @@ def _expected(repository: Path) -> dict[Path, str]:
 def _section(group: Sequence[Result], settings: TrainConfig) -> str:
     """The section of a kind: its table, commands and images."""
     first = group[0]
-    changed = changed_arguments(first.env_id, first.arguments)
-    task = " with ".join([plain_id(first.env_id), *([", ".join(changed)] if changed else [])])
     lines = [
-        f"## {task}, {first.algorithm.upper()}",
+        f"## {first.title}",
         "",
         _environment(first) + _first_stage(first, settings),
         "",

@@ -23,10 +23,10 @@ _CLEAR = 0.015
 # height per horizontal distance beyond the width of the funnel; m, that width for the open hand
 # and for a carried cube
 _SLOPE, _HAND_FUNNEL, _CUBE_FUNNEL = 2.0, 0.01, 0.015
-# m, horizontal error at which a cube is released: of two cubes, and of higher towers, which fall
-# if their cubes are not in line
-_ALIGNED, _IN_LINE = 0.005, 0.0003
-# m, above its place and below it, to which a cube is lowered before and after it is aligned
+# horizontal error at which a cube is released: of two cubes, of half their width; m, of higher
+# towers, which fall if their cubes are not in line
+_ALIGNED, _IN_LINE = 0.2, 0.0003
+# m, above its place and below it, to which a cube is lowered before and while it is aligned
 _HOVER, _PRESS = 0.004, 0.002
 # m and m/s, height above its place and speed of the hand at which a cube is released
 _LOW, _SLOW = 0.005, 0.2
@@ -69,7 +69,7 @@ def stack(observation: dict[str, Array]) -> Array:
     which = np.where(done, 0, np.argmin(placed, axis=1))
     cube, half, holds = cubes[worlds, which], halves[worlds, which], held[worlds, which]
     place = goals[worlds, which]
-    on_tower = which > 0  # whose top is where the tower is
+    on_tower = which > 0  # a tower that has shifted goes on where its top cube is
     place[on_tower, :2] = cubes[worlds, which - 1][on_tower, :2]
     place[on_tower, 2] = (tops[worlds, which - 1] + half)[on_tower]
 
@@ -83,22 +83,23 @@ def stack(observation: dict[str, Array]) -> Array:
     funnel = np.where(holds, _CUBE_FUNNEL, _HAND_FUNNEL)
     height = np.minimum(end[:, 2] + _SLOPE * np.maximum(off - funnel, 0.0), level)
     height[done] = level[done]
-    # a cube is released where it will be aligned, if it does not move fast
+    nearby = np.maximum(off, np.abs(move[:, 2])) < np.minimum(_HAND_FUNNEL, 0.5 * half)
+    grasps_now = ~holds & ~done & nearby
+    # a cube is released where the servo would leave it, if it does not move fast
     drift = (1.0 - _KEPT) * (reference - hand) + _GLIDE * velocity
     ahead = np.hypot(*(move - drift)[:, :2].T)
-    aligned = np.maximum(off, ahead) < (_ALIGNED if n == 2 else _IN_LINE)
+    aligned = np.maximum(off, ahead) < (_ALIGNED * half if n == 2 else _IN_LINE)
     height[holds] += np.where(aligned, -_PRESS, _HOVER)[holds]
     slow = np.abs(velocity).max(axis=1) < _SLOW
     releases = holds & aligned & slow & (cube[:, 2] < place[:, 2] + _LOW)
 
     # sideways only above what is in the way
     move[:, :2] *= np.clip((start[:, 2] - height) / (0.5 * _CLEAR) + 1.0, 0.0, 1.0)[:, None]
-    grasping = ~holds & ~done & (off < _HAND_FUNNEL) & (np.abs(move[:, 2]) < _HAND_FUNNEL)
     move[:, 2] = height - start[:, 2]
     opens = ~holds & (opening < 2.0 * half + _CLEAR_OPENING)
-    move[opens | releases] = 0.0
+    move[(opens & ~grasps_now) | releases] = 0.0
     strides = np.clip((hand + move - reference) / Stack.hand.stride, -1.0, 1.0)
-    grip = np.where((holds & ~releases) | grasping, CLOSE, OPEN)
+    grip = np.where((holds & ~releases) | grasps_now, CLOSE, OPEN)
     return np.concatenate([strides, grip[:, None]], axis=1)
 
 

@@ -15,7 +15,7 @@ Array = np.ndarray
 TO_SUN = np.array([-0.22, -0.52, 0.825]) / np.linalg.norm([-0.22, -0.52, 0.825])
 # rows are two unit vectors across the light, and the one to the sun
 SUN_FRAME = np.vstack([np.linalg.svd(TO_SUN[None])[2][1:], TO_SUN])
-SUN_SIZE = 0.06  # half-width over distance
+SUN_SIZE = 0.03  # half-width over distance
 SKY, UPWARDS, SUN = 0.60, 0.12, 0.44  # brightness of a surface: from all sides, from above, direct
 SHARPNESS = 30  # exponent of the highlight
 GROUND_SHADOW = (0.385, 0.36, 0.32)  # what full shadow takes of the ground; less blue, as the sky

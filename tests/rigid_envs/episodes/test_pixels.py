@@ -1,5 +1,7 @@
 """Pixels as observations: what they show, and that they belong to their world and step."""
 
+import warnings
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -165,6 +167,15 @@ def test_a_camera_is_chosen_for_pixels_too():
 def test_what_cannot_be_observed_is_named(settings, message):
     with pytest.raises(ValueError, match=message):
         make(**{**SMALL, **settings})
+
+
+def test_a_size_of_frames_that_are_not_drawn_is_warned_about():
+    with pytest.warns(UserWarning, match="width=64 and height=480.*pixel_size"):
+        make(**SMALL, width=64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make(**SMALL, width=64, render_mode="rgb_array")
+        make(**SMALL)
 
 
 def test_a_policy_learns_from_pixels():

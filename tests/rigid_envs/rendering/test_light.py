@@ -88,7 +88,7 @@ def test_a_soft_shadow_is_the_fraction_of_the_sun_that_is_hidden(shape, height):
     expected = tiles * (1.0 - hidden[:, None] * GROUND_SHADOW)
     off = np.abs(found.rgb[0][ground] - expected).max(axis=-1)
     assert (hidden == 1.0).any() or height > 0.1
-    assert ((hidden > 0.0) & (hidden < 1.0)).sum() > 50
+    assert ((hidden > 0.0) & (hidden < 1.0)).sum() > 25
     # a point of the sun is an eighth, 10 of 255 levels; at its rim rounding decides
     assert (off > 2.0).sum() <= 0.03 * (hidden > 0.0).sum()
 

@@ -17,7 +17,7 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 from physics import World
 from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.cameras import following
+from rigid_envs.rendering.cameras import NAMED, choose_camera, following
 from rigid_envs.rendering.renderer import grid
 from rigid_envs.rendering.view import BODY_COLORS, Mark
 from rigid_envs.tasks import Push, PushT, Reach, Slide, Stack, Throw
@@ -182,10 +182,11 @@ def test_one_world_and_many_draw_alike(env_id, option):
 # --- what there is to see ------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("name", ["task", *NAMED])
 @pytest.mark.parametrize(
     "task", [Push(), PushT(), Reach(), Slide(), Stack(5), Throw()], ids=lambda t: type(t).__name__
 )
-def test_the_camera_sees_the_whole_task(task):
+def test_every_camera_sees_the_whole_task(task, name):
     world = World(task.scene())
     draws = np.random.default_rng(0).random((1, 200, task.draw_count))[0]
     points = []
@@ -195,7 +196,7 @@ def test_the_camera_sees_the_whole_task(task):
         if len(places) == 2:  # a pose in the plane
             places = np.append(places, 0.0)
         points += [*world.position[0], *world.drive_position[0], *places.reshape(-1, 3)]
-    pixels, _ = task.camera.project(np.array(points), 480, 480)
+    pixels, _ = choose_camera(name, task).project(np.array(points), 480, 480)
     assert pixels.min() > 10
     assert pixels.max() < 470
 

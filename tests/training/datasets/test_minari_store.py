@@ -96,9 +96,10 @@ def test_noise_on_actions_is_recorded_as_the_environment_took_it():
     policy = scripted_policy(PUSH, **FAST)
     plain = write_dataset(policy, 20, "plain-v0")
     noisy = write_dataset(policy, 20, "noisy-v0", action_noise=0.3)
-    write_dataset(policy, 20, "again-v0", action_noise=0.3)
+    unnamed = write_dataset(policy, 20, action_noise=0.3)
+    assert unnamed.dataset_id == "rigid-envs/push/scripted-noise-0-3-v0"
     first, second, third = (
-        minari.load_dataset(f"{name}-v0") for name in ("plain", "noisy", "again")
+        minari.load_dataset(name) for name in ("plain-v0", "noisy-v0", unnamed.dataset_id)
     )
     actions, other, same = (np.stack([e.actions for e in d]) for d in (first, second, third))
     np.testing.assert_array_equal(other, same)
