@@ -11,6 +11,7 @@ python -m benchmarks.fuzz [--scenes 1e5] [--families "one box" ...] [--resume CS
 """
 
 import argparse
+import math
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
@@ -50,11 +51,13 @@ def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
     results: Counts = {}
     for row in read_rows(path, HEADER) if path else ():
         results[row[0], int(row[1])] = list(map(float, row[2:]))
-    each = max(1, round(scenes / len(families)))
+    each = scenes / sum(family.share for family in families)
+    counts = {family.name: max(1, math.ceil(each * family.share)) for family in families}
     chunks = [
-        (family, first, min(CHUNK, each - first))
-        for first in range(0, each, CHUNK)
+        (family, first, min(CHUNK, counts[family.name] - first))
+        for first in range(0, max(counts.values()), CHUNK)
         for family in families
+        if first < counts[family.name]
     ]
     left = [
         (family, first, count)

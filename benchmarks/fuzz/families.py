@@ -34,6 +34,11 @@ class Family(NamedTuple):
     tilted: bool = False
     fidelity: dict[str, Any] = {}
 
+    @property
+    def share(self) -> float:
+        """How many scenes, relative to others: time control takes up to a hundred times as long."""
+        return 0.05 if "time_control" in self.fidelity else 1.0
+
 
 IMPULSE = {"law": "impulse"}
 NEWTON = {"law": "impulse", "solver": "newton"}
