@@ -4,8 +4,10 @@ The scenes have 1 to 6 bodies of random shapes with masses of 1e-6 to 1e6 kg, si
 1e2 m, speeds up to 1e4 m/s and rad/s, gravity up to 1e3 m/s^2, any friction, restitution and
 stiffness, at any pose, with drives, joints and fields, and any settings of Fidelity. They belong to
 families, each with kernels of its own. A scene that runs does so for 50 substeps; a divergence must
-come as SimulationDiverged with a reason. Constructors are then called with garbage. What is not as
-it must be is a finding, and saved as a script in .failures/; so are divergences.
+come as SimulationDiverged with a reason. Where particles overlap so deeply that there is no room
+for their contacts, a step refuses the scene by ContactOverflow. Constructors are then called with
+garbage. What is not as it must be is a finding, and saved as a script in .failures/; so are
+divergences.
 
 python -m benchmarks.fuzz [--scenes 1e5] [--families "one box" ...] [--resume CSV] [--write]
 """

@@ -36,8 +36,9 @@ class Family(NamedTuple):
 
     @property
     def share(self) -> float:
-        """How many scenes, relative to others: time control takes up to a hundred times as long."""
-        return 0.05 if "time_control" in self.fidelity else 1.0
+        """How many scenes, relative to others: adaptive steps take up to a hundred times longer."""
+        adaptive = self.fidelity.get("integrator") == "adaptive"
+        return 0.05 if adaptive or "time_control" in self.fidelity else 1.0
 
 
 IMPULSE = {"law": "impulse"}

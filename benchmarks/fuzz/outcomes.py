@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.fuzz.families import Family
 from benchmarks.fuzz.scenes import draw_scene
-from physics import Features, SimulationDiverged, World
+from physics import ContactOverflow, Features, SimulationDiverged, World
 
 SUBSTEPS = 50  # that a scene runs
 REFUSED, RAN, DIVERGED, FINDING = "refused", "ran", "diverged", "finding"
@@ -53,6 +53,8 @@ def outcome_of(family: Family, number: int) -> Outcome:
     except SimulationDiverged as error:
         known = "likely cause" in str(error)
         return Outcome(DIVERGED if known else FINDING, str(error), world.features)
+    except ContactOverflow as error:  # bodies overlap so deeply that there is no room for pairs
+        return Outcome(REFUSED, str(error), world.features)
     except Exception as error:
         return Outcome(FINDING, f"{type(error).__name__} in a step: {error}", world.features)
     if not np.isfinite(world.read().rows).all():

@@ -31,6 +31,7 @@ _HOVER, _PRESS = 0.004, 0.002
 # m and m/s, height above its place and speed of the hand at which a cube is released
 _LOW, _SLOW = 0.005, 0.2
 OPEN, CLOSE = 1.0, -1.0
+_CUBE = (len(Stack(blocks=2).bounds) - len(Hand.bounds)) // 2  # components of a cube's observation
 
 # The servo is critically damped: after a step of T the hand is d (1 + w T) exp(-w T) +
 # v T exp(-w T) from its reference, where d is its distance and v its velocity now
@@ -53,7 +54,8 @@ def stack(observation: dict[str, Array]) -> Array:
     worlds, goals = np.arange(count), goals.reshape(count, n, 3)
     hand, velocity = values[:, 0:3], values[:, 3:6]
     opening, reference = values[:, 6], values[:, 8:11]
-    cubes = values[:, len(Hand.bounds) :].reshape(count, n, -1)[:, :, 0:3]
+    first, last = len(Hand.bounds), len(Hand.bounds) + n * _CUBE  # the guide may follow
+    cubes = values[:, first:last].reshape(count, n, _CUBE)[:, :, 0:3]
 
     halves = _half_widths(goals)
     tops = cubes[:, :, 2] + halves

@@ -324,6 +324,17 @@ def test_a_scripted_controller_builds_a_tower_of_two_with_noise_on_its_actions()
     assert solved("balanced", 300, 2, noise=0.06).mean() >= 0.95
 
 
+def test_a_scripted_controller_acts_alike_whatever_else_is_observed():
+    more = {"observe_task_guide": True, "randomize": {"mass": (1.0, 1.0)}}
+    plain, longer = (
+        make_vec(4, STACK, **arguments).reset(seed=3)[0]
+        for arguments in ({}, {**more, "observe_parameters": True})
+    )
+    assert longer["observation"].shape[1] > plain["observation"].shape[1] + 7
+    act = controller_for(STACK)
+    np.testing.assert_array_equal(act(longer), act(plain))
+
+
 @pytest.mark.parametrize(("fidelity", "size"), [("fast", (0.8, 1.2)), ("balanced", (0.5, 0.65))])
 def test_a_scripted_controller_builds_towers_of_two_of_any_width(fidelity, size):
     """A top that is not well aligned slides off or tips after it was placed."""
