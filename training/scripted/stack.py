@@ -71,7 +71,7 @@ def stack(observation: dict[str, Array]) -> Array:
     which = np.where(done, 0, np.argmin(placed, axis=1))
     cube, half, holds = cubes[worlds, which], halves[worlds, which], held[worlds, which]
     place = goals[worlds, which]
-    on_tower = which > 0  # a tower that has shifted goes on where its top cube is
+    on_tower = which > 0  # the tower may have shifted: continue where its top cube is
     place[on_tower, :2] = cubes[worlds, which - 1][on_tower, :2]
     place[on_tower, 2] = (tops[worlds, which - 1] + half)[on_tower]
 
