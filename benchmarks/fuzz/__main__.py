@@ -49,7 +49,7 @@ def run_family(family: Family, first: int, count: int) -> list[float]:
 
 
 def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
-    """Runs all chunks that a resumed file doesn't hold, or holds with fewer scenes."""
+    """Runs the scenes that a resumed file doesn't hold."""
     results: Counts = {}
     for row in read_rows(path, HEADER) if path else ():
         results[row[0], int(row[1])] = list(map(float, row[2:]))
@@ -61,14 +61,18 @@ def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
         for family in families
         if first < counts[family.name]
     ]
+    held = {key: int(sum(row[: len(KINDS)])) for key, row in results.items()}
     left = [
         (family, first, count)
         for family, first, count in chunks
-        if sum(results.get((family.name, first), [])[: len(KINDS)]) < count
+        if held.get((family.name, first), 0) < count
     ]
     start = perf_counter()
     for done, (family, first, count) in enumerate(left):
-        found = run_family(family, first, count)
+        ran = held.get((family.name, first), 0)
+        found = run_family(family, first + ran, count - ran)
+        if ran:
+            found = _joined(results[family.name, first], found)
         results[family.name, first] = found
         if path:
             append_rows(path, HEADER, [[family.name, first, *found]])
@@ -80,6 +84,13 @@ def run(families: list[Family], scenes: float, path: Path | None) -> Counts:
             flush=True,
         )
     return results
+
+
+def _joined(chunk: list[float], more: list[float]) -> list[float]:
+    """The numbers of a chunk and of its further scenes, which may need the same kernels."""
+    joined = [a + b for a, b in zip(chunk, more, strict=True)]
+    joined[len(KINDS)] = max(chunk[len(KINDS)], more[len(KINDS)])
+    return joined
 
 
 def table(results: Counts) -> Table:
