@@ -53,6 +53,7 @@ FILM = (
     {"Push": 16, "Stack": 48, "Throw": 24},
     {"PushT": 48, "Reach": 12, "Slide": 32},
 )
+FILM_ARGUMENTS: dict[str, dict[str, Any]] = {"PushT": {"fidelity": "balanced"}}
 FILM_LENGTH = 96
 FILM_SIZE, FILM_FPS, FILM_COLOURS = 260, 25.0, 128
 
@@ -87,7 +88,7 @@ def draw_film(path: Path) -> None:
 
 def _film(task: str, steps: int) -> list[Array]:
     """FILM_LENGTH frames: `steps` of each of several episodes."""
-    arguments = STRIPS[task.lower()].arguments if task == "PushT" else {}
+    arguments = FILM_ARGUMENTS.get(task, {})
     return [
         frame
         for k in range(FILM_LENGTH // steps)

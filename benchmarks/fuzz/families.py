@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class Family(NamedTuple):
-    """Scenes that share a kernel.
+    """Scenes of the same kinds of solids and settings, with one kernel or a few.
 
     Attributes:
         name: of the family.
@@ -36,9 +36,9 @@ class Family(NamedTuple):
 
     @property
     def share(self) -> float:
-        """How many scenes, relative to others: adaptive steps take up to a hundred times longer."""
-        adaptive = self.fidelity.get("integrator") == "adaptive"
-        return 0.05 if adaptive or "time_control" in self.fidelity else 1.0
+        """How many scenes, relative to others: where the step varies, one takes far longer."""
+        varies = self.fidelity.get("integrator") == "adaptive" or "time_control" in self.fidelity
+        return 0.05 if varies else 1.0
 
 
 IMPULSE = {"law": "impulse"}

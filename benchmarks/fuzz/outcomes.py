@@ -53,8 +53,9 @@ def outcome_of(family: Family, number: int) -> Outcome:
     except SimulationDiverged as error:
         known = "likely cause" in str(error)
         return Outcome(DIVERGED if known else FINDING, str(error), world.features)
-    except ContactOverflow as error:  # bodies overlap so deeply that there is no room for pairs
-        return Outcome(REFUSED, str(error), world.features)
+    except ContactOverflow as error:  # overlapping deeply, or a wide skin; of particles alone
+        particles = family.fidelity.get("geometry") == "particle"
+        return Outcome(REFUSED if particles else FINDING, str(error), world.features)
     except Exception as error:
         return Outcome(FINDING, f"{type(error).__name__} in a step: {error}", world.features)
     if not np.isfinite(world.read().rows).all():

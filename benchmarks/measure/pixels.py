@@ -87,7 +87,8 @@ def measure(panda_python: Path | None = None) -> Iterator[Table]:
          rate(steps_side(size), SECONDS)]
         for size, target in SIZES.items()
     ]  # fmt: skip
-    columns = ["pixels", "target", "frames per second", "target ", "env steps per second"]
+    columns = ["pixels", "target frames", "frames per second"]
+    columns += ["target steps", "env steps per second"]
     title = f"Push, {WORLDS:,} worlds, {THREADS} threads, pixels as observations"
     yield Table("pixels", title, columns, rows)
     heap: list[list[Cell]] = [["16,384 chess pieces", PIECES_TARGET, rate(crowd_side(), SECONDS)]]

@@ -36,9 +36,9 @@ Array = np.ndarray
 
 # eigenvalue at which a mode that flips becomes unstable
 _FLIP = 2.0
-_LONGEST = 1e3  # s, a step beyond which nothing counts as a limit
+_SHORTEST, _LONGEST = 1e-12, 1e3  # s, between which limits are sought
 _PRECISION = 1e-10  # of a step, relative
-_MOST = 1e300  # a load beyond it counts as this, as does one that is not finite
+_MOST = 1e300  # a load beyond it counts as this, so that logarithms are finite
 # solids that can touch a body at once, all on faces: a cube has six
 _PARTNERS = 6
 _TURN = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
@@ -88,17 +88,20 @@ def servo_load(dynamic: Any, h: float) -> float:
 def root(load: Callable[[float], float]) -> float:
     """Step in s at which a load that grows with the step reaches the limit; inf if it doesn't.
 
-    By regula falsi between logarithms, in which loads are nearly straight. An end that stays counts
-    half at each further step (the Illinois rule), so that both ends come close.
+    `_SHORTEST` if the load exceeds the limit there already. By regula falsi between logarithms, in
+    which loads are nearly straight. An end that stays counts half at each further step (the
+    Illinois rule), so that both ends come close.
     """
 
     def excess(x: float) -> float:
         return math.log(max(min(_MOST, load(math.exp(x))), 1.0 / _MOST) / _FLIP)
 
-    ends = [math.log(1e-12), math.log(_LONGEST)]
+    ends = [math.log(_SHORTEST), math.log(_LONGEST)]
     values = [excess(x) for x in ends]
     if values[1] < 0.0:
         return math.inf
+    if values[0] >= 0.0:
+        return _SHORTEST
     moved = -1
     while ends[1] - ends[0] > _PRECISION:
         low, high = ends

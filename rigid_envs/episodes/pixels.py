@@ -104,7 +104,7 @@ class Pixels:
     def __init__(self, runner: "Runner", settings: PixelSettings) -> None:
         self._runner, self._kinds, self._stack = runner, settings.kinds, settings.frame_stack
         width, height = settings.width, settings.height
-        camera = choose_camera(settings.camera, runner.task)
+        camera = choose_camera(settings.camera, runner.task, width / height)
         floor = scene_view.floor(runner.world.scene)
         self._ground = floor.solid
         self._renderer = Renderer(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from physics.scene.validation import vector
 from rigid_envs.rendering.camera import Camera
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ USED = 0.85  # of the picture, in which both are, or all of a workspace
 LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 
-def choose_camera(given: Any, task: "Task") -> Camera:
+def choose_camera(given: Any, task: "Task", shape: float = 1.0) -> Camera:
     """A camera from a name, from settings, or the task's own.
 
     Args:
@@ -31,10 +32,11 @@ def choose_camera(given: Any, task: "Task") -> Camera:
             workspace, as near as all of that is seen; a Camera; or a dict with some of `FIELDS`,
             the others being those of the task's camera.
         task: whose camera and workspace.
+        shape: width over height of the picture.
 
     Raises:
         TypeError: none of these, or a value of another type.
-        ValueError: an unknown name or field, or a value out of its range.
+        ValueError: an unknown name or field, a value out of its range, or an invalid workspace.
     """
     own = task.camera
     if given is None or isinstance(given, Camera):
@@ -46,8 +48,11 @@ def choose_camera(given: Any, task: "Task") -> Camera:
             names = ", ".join(map(repr, ("task", FOLLOW, *NAMED)))
             raise ValueError(f"camera must be one of {names}, got {given!r}")
         azimuth, elevation = NAMED[given]
-        if task.workspace:
-            return looking_at(*task.workspace, azimuth, elevation, USED)
+        if task.workspace is not None:
+            low, high = (vector("corner of Task.workspace", corner) for corner in task.workspace)
+            if not all(a < b for a, b in zip(low, high, strict=True)):
+                raise ValueError(f"Task.workspace must be (low, high), got {task.workspace}")
+            return looking_at(low, high, azimuth, elevation, USED, shape)
         return Camera.around(own.target, own.distance, azimuth, elevation, own.field_of_view)
     if not isinstance(given, Mapping):
         raise TypeError(
@@ -80,9 +85,14 @@ def following(
 
 
 def looking_at(
-    low: Any, high: Any, azimuth: float = -65.0, elevation: float = 30.0, used: float = 1.0
+    low: Any,
+    high: Any,
+    azimuth: float = -65.0,
+    elevation: float = 30.0,
+    used: float = 1.0,
+    shape: float = 1.0,
 ) -> Camera:
-    """A camera whose square picture shows a box, from as near as it can.
+    """A camera that sees a box, from as near as it can.
 
     Args:
         low: (3,) m, least coordinates.
@@ -90,6 +100,7 @@ def looking_at(
         azimuth: degrees, see `Camera.around`.
         elevation: degrees, likewise.
         used: fraction of the picture within which the box is to be.
+        shape: width over height of the picture.
     """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     corners = low + (high - low) * np.array(
@@ -97,7 +108,7 @@ def looking_at(
     )
     target = tuple((0.5 * (low + high)).tolist())
     view = Camera.around(target, 1.0, azimuth, elevation)
-    return Camera.around(target, _fitting(view, corners, used), azimuth, elevation)
+    return Camera.around(target, _fitting(view, corners, used, shape), azimuth, elevation)
 
 
 def _fitting(view: Camera, points: Array, used: float = 1.0, shape: float = 1.0) -> float:

@@ -64,7 +64,7 @@ class Pictures:
         self._show_particles: bool = instance("show_particles", show_particles, bool)
         self._width = integer("width", width, low=LEAST, high=MOST)
         self._height = integer("height", height, low=LEAST, high=MOST)
-        self.camera = choose_camera(camera, runner.task)
+        self.camera = choose_camera(camera, runner.task, self._width / self._height)
         self._follows = isinstance(camera, str) and camera == FOLLOW
         self._floor = scene_view.floor(runner.world.scene).height
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)

@@ -95,7 +95,7 @@ def default_id(env_id: str, policy: str, action_noise: float = 0.0) -> str:
     name = env_id.rpartition("/")[2].rpartition("-v")[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
     algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
-    noise = f"-noise-{action_noise:g}".replace(".", "-") if action_noise else ""
+    noise = re.sub(r"[^\w]+", "-", f"-noise-{action_noise!r}") if action_noise else ""
     return f"rigid-envs/{words}/{algorithm}{noise}-v0"
 
 
@@ -115,7 +115,7 @@ def write_dataset(
     Args:
         policy: what acts.
         episodes: their number.
-        dataset_id: (namespace/)name-v0; by default from the environment and the policy.
+        dataset_id: (namespace/)name-v0; by default from the environment, the policy and the noise.
         seed: of the first episode.
         action_noise: standard deviation of normal noise on the actions, whose bounds are 1. What
             is recorded is what the environment took, clipped to its bounds; so the episodes also

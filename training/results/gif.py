@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 WIDTH = 320
-"""Pixels. Three episodes then take 50 to 320 KB; the long episodes of Stack take most."""
+"""Pixels. Three episodes then take 50 to 260 KB."""
 COLOURS = 64
 """Enough for a few bodies on a plain ground; more colours double the size, hardly visibly."""
 SKIP = 2

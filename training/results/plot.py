@@ -49,10 +49,11 @@ def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None
     elif image is None:
         image = folders[0].path.parent / f"{folder_name(first.env_id)}_learning_curves.png"
     seeds = ", ".join(str(config.seed) for config in configs)
+    word = "seeds" if len(configs) > 1 else "seed"
     draw_learning_curves(
         curves,
         image,
-        title=f"{first.env_id}, {first.algo}, seed{'s' if len(configs) > 1 else ''} {seeds}",
+        title=f"{first.env_id}, {first.algo.upper()}, {word} {seeds}",
         labels=[f"seed {config.seed}" for config in configs],
         targets={config.target_success_rate for config in configs} - {None},  # type: ignore[arg-type]
     )
@@ -99,7 +100,8 @@ def draw_learning_curves(
         axes.set_xlim(left=0)
         for target in targets:
             axes.axhline(100 * target, color="gray", linestyle=":")
-    left.set(xlabel="wall time / s", ylabel="success / %", ylim=(-2, 102))
+    success = "success / %" if lines is evaluated else "success with exploration / %"
+    left.set(xlabel="wall time / s", ylabel=success, ylim=(-2, 102))
     right.set(xlabel="environment steps / million")
     lines, names = right.get_legend_handles_labels()
     if names:  # above the plots, where it hides nothing

@@ -201,6 +201,27 @@ def test_every_camera_sees_the_whole_task(task, name):
     assert pixels.max() < 470
 
 
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("task", [Slide(), Throw()], ids=lambda t: type(t).__name__)
+def test_a_workspace_is_seen_in_a_narrow_picture(task, name):
+    corners = np.array(np.meshgrid(*np.transpose(task.workspace))).reshape(3, 8).T
+    pixels, _ = choose_camera(name, task, 240 / 480).project(corners, 240, 480)
+    assert pixels.min() > 0
+    assert (pixels < (240, 480)).all()
+
+
+@pytest.mark.parametrize(
+    "workspace", [((0.0, 0.0, 0.0), (1.0, 1.0)), ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0))]
+)
+def test_an_invalid_workspace_is_named(workspace):
+    class Other(Push):
+        pass
+
+    Other.workspace = workspace
+    with pytest.raises(ValueError, match=r"Task\.workspace must be"):
+        choose_camera("front", Other())
+
+
 @pytest.mark.parametrize(
     ("task", "low", "high"),
     [
