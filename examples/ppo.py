@@ -161,7 +161,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--env", default="RigidEnvs/PushDense-v0", help="id (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--total-steps", type=int, default=5_000_000)
+    parser.add_argument("--total-steps", type=int, default=5_000_000, help="whole updates of them")
     parser.add_argument("--num-envs", type=int, default=1024)
     parser.add_argument("--num-steps", type=int, default=50, help="of a world for an update")
     parser.add_argument("--batch-size", type=int, default=6400)
@@ -172,7 +172,14 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--clip", type=float, default=0.2)
     parser.add_argument("--threads", type=int, default=1, help="of torch; more need idle cores")
     parser.add_argument("--stop-at", type=float, default=0.97, help="success rate")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    rollout = options.num_envs * options.num_steps
+    if options.total_steps < rollout:
+        parser.error(
+            f"--total-steps is {options.total_steps}, should be at least num-envs x num-steps, "
+            f"{rollout}"
+        )
+    return options
 
 
 if __name__ == "__main__":

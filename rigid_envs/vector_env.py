@@ -17,7 +17,7 @@ from rigid_envs.episodes.runner import Observation, Runner
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.pictures import FPS, RENDER_MODES, Pictures
 from rigid_envs.tasks import Task
-from rigid_envs.tasks.rewards import Reward
+from rigid_envs.tasks.rewards import Reward, describe_info
 
 Array = np.ndarray
 
@@ -300,7 +300,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             ValueError: not such a state, or one of another scene, fidelity, count or version.
         """
         if not isinstance(state, dict) or "ended" not in state:
-            raise ValueError(f"state must come from get_state, got {state!r}")
+            raise ValueError(
+                "state must come from get_state of a vector environment, got "
+                f"{describe_info(state)}"
+            )
         state = dict(state)
         ended = state.pop("ended")
         self._runner.set_state(state)

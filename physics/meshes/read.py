@@ -24,7 +24,8 @@ def read_mesh(source: Any) -> tuple[Array, Array]:
         import trimesh
     except ImportError:
         raise ImportError(
-            "Mesh(path or trimesh.Trimesh) needs trimesh: pip install 'rigid-envs[mesh]'; "
+            "Mesh(path or trimesh.Trimesh) needs trimesh; to install, in a clone: "
+            "pip install -c constraints.txt '.[mesh]'. "
             "Mesh(vertices=..., faces=...) needs only numpy"
         ) from None
     if isinstance(source, trimesh.Trimesh):

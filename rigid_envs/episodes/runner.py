@@ -17,7 +17,7 @@ from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms
 from rigid_envs.tasks import Task
-from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS
+from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, describe_info
 
 Array = np.ndarray
 
@@ -353,13 +353,22 @@ class Runner:
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Any:
         """The reward [...] of goals [..., goal]; see `Reward.compute`."""
+        self._check_goals(achieved_goal=achieved, desired_goal=desired)
         return self.reward.compute(self.reward_type, achieved, desired, info)
 
     def compute_terminated(self, achieved: Array, desired: Array) -> Any:
         """Whether [...] a step with these goals [..., goal] terminates the episode."""
+        self._check_goals(achieved_goal=achieved, desired_goal=desired)
         success = self.reward.success(self.reward.distance(achieved, desired))
         terminated = np.logical_and(success, self.terminate_on_success)
         return terminated if terminated.ndim else bool(terminated)
+
+    def _check_goals(self, **goals: Array) -> None:
+        """Raises ValueError for goals of another size than the task's."""
+        size = len(self.task.goal_bounds)
+        for name, goal in goals.items():
+            if (shape := np.shape(goal))[-1:] != (size,):
+                raise ValueError(f"{name} must have shape [..., {size}], got {shape}")
 
     def compute_truncated(self, achieved: Array, info: Any) -> Any:
         """Whether [...] a step was truncated because it left the bounds of the observation.
@@ -401,7 +410,9 @@ class Runner:
         if self._pixels:
             wanted.add("pixels")
         if not isinstance(state, dict) or set(state) != wanted:
-            raise ValueError(f"state must be a dict with the keys {sorted(wanted)}, got {state!r}")
+            raise ValueError(
+                f"state must be a dict with the keys {sorted(wanted)}, got {describe_info(state)}"
+            )
         if state["version"] != STATE_VERSION:
             raise ValueError(f"state must have version {STATE_VERSION}, got {state['version']!r}")
         if self._pixels:

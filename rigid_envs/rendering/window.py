@@ -38,7 +38,8 @@ def load_pygame() -> Any:
         import pygame
     except ImportError as error:
         raise DependencyNotInstalled(
-            'a window needs pygame: pip install "rigid-envs[render]"'
+            "a window needs pygame; to install, in a clone: "
+            'pip install -c constraints.txt ".[render]"'
         ) from error
     return pygame
 

@@ -48,6 +48,9 @@ def print_training(trained: TrainResult) -> None:
     """Prints the outcome of training in one line, for the whole run if it was resumed."""
     fraction = trained.environment_time_fraction
     in_envs = "" if fraction is None else f", {fraction:.0%} of the time in the environments"
+    reached = trained.target_reached
+    if reached is not None:
+        print(f"target reached: the mean action solved {reached:.1%} of the evaluation's episodes")
     print(
         f"{'interrupted' if trained.interrupted else 'trained'} after {trained.steps:,} steps in "
         f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s{in_envs}): "

@@ -34,5 +34,5 @@ def require(extra: str, modules: Sequence[str]) -> None:
     if missing:
         raise UsageError(
             f"this command requires {', '.join(missing)}; "
-            f'to install: pip install "rigid-envs[{extra}]"'
+            f'to install, in a clone: pip install -c constraints.txt ".[{extra}]"'
         )

@@ -224,6 +224,13 @@ def add_dataset(parser: argparse.ArgumentParser) -> None:
         metavar="DEVIATION",
         help="standard deviation of noise on the actions (default: 0)",
     )
+    parser.add_argument(
+        "--slowdown",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="multiply each step's movement by a number drawn from 1 - S to 1 (default: 0)",
+    )
     parser.add_argument("--replace", action="store_true", help="replace a dataset of the same name")
     add_environment(parser)
     # a model.zip is not accepted: it would have to be unpickled

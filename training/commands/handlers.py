@@ -240,6 +240,7 @@ def dataset(options: argparse.Namespace) -> int:
         options.dataset_id,
         seed=minari_store.FIRST_SEED if options.seed is None else options.seed,
         action_noise=options.action_noise,
+        slowdown=options.slowdown,
         replace_existing=options.replace,
         **kwargs,
     )

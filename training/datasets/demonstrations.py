@@ -29,7 +29,8 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
     name = config.demonstrations
     if any(importlib.util.find_spec(module) is None for module in ("minari", "h5py")):
         raise UsageError(
-            'demonstrations require minari and h5py; to install: pip install "rigid-envs[data]"'
+            "demonstrations require minari and h5py; to install, in a clone: "
+            'pip install -c constraints.txt ".[data]"'
         )
     import minari
 
@@ -48,10 +49,13 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
 
 
 def _recorded(episode: Any) -> Recorded:
+    actions = np.asarray(episode.actions)
+    intended = episode.infos.get("intended_action")
     return Recorded(
         seed=-1,
         observations={key: np.asarray(values) for key, values in episode.observations.items()},
-        actions=np.asarray(episode.actions),
+        actions=actions,
+        intended=actions if intended is None else np.asarray(intended)[1:],
         rewards=np.asarray(episode.rewards),
         terminated=np.asarray(episode.terminations, dtype=bool),
         truncated=np.asarray(episode.truncations, dtype=bool),

@@ -90,13 +90,14 @@ def random_policy(env_id: str, seed: int = 0, **env_kwargs: Any) -> Policy:
     return Policy(act, env_id, RANDOM, env_kwargs)
 
 
-def default_id(env_id: str, policy: str, action_noise: float = 0.0) -> str:
+def default_id(env_id: str, policy: str, action_noise: float = 0.0, slowdown: float = 0.0) -> str:
     """The name of a dataset, as rigid-envs/push-dense/scripted-v0 or .../scripted-noise-0-06-v0."""
     name = env_id.rpartition("/")[2].rpartition("-v")[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
     algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
-    noise = re.sub(r"[^\w]+", "-", f"-noise-{action_noise!r}") if action_noise else ""
-    return f"rigid-envs/{words}/{algorithm}{noise}-v0"
+    for word, value in (("noise", action_noise), ("slowdown", slowdown)):
+        algorithm += re.sub(r"[^\w]+", "-", f"-{word}-{value!r}") if value else ""
+    return f"rigid-envs/{words}/{algorithm}-v0"
 
 
 def write_dataset(
@@ -106,6 +107,7 @@ def write_dataset(
     *,
     seed: int = FIRST_SEED,
     action_noise: float = 0.0,
+    slowdown: float = 0.0,
     replace_existing: bool = False,
     report: Callable[[int], None] = lambda _: None,
     **env_kwargs: Any,
@@ -118,8 +120,13 @@ def write_dataset(
         dataset_id: (namespace/)name-v0; by default from the environment, the policy and the noise.
         seed: of the first episode.
         action_noise: standard deviation of normal noise on the actions, whose bounds are 1. What
-            is recorded is what the environment took, clipped to its bounds; so the episodes also
-            show how the policy corrects errors.
+            is recorded as actions is what the environment took, clipped to its bounds; so the
+            episodes also show how the policy corrects errors. `infos["intended_action"]` holds
+            what the policy chose, which is what to imitate (Laskey et al., DART: noise injection
+            for robust imitation learning, CoRL 2017).
+        slowdown: each step's movement, but not a grip, is multiplied by a number drawn from
+            1 - slowdown to 1, before the noise. So the episodes also show what to do where the hand
+            is slow or at rest.
         replace_existing: whether a dataset of this name may be replaced.
         report: called with the number of episodes that have ended.
         env_kwargs: arguments of the environment that replace those of the policy.
@@ -133,19 +140,20 @@ def write_dataset(
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
     if not 0.0 <= action_noise < np.inf:
         raise UsageError(f"action_noise is {action_noise}, should be a number of at least 0")
+    if not 0.0 <= slowdown <= 1.0:
+        raise UsageError(f"slowdown is {slowdown}, should be a number from 0 to 1")
     name = dataset_id
     if name is None:
-        name = default_id(policy.env_id, policy.name, action_noise)
+        name = default_id(policy.env_id, policy.name, action_noise, slowdown)
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0"
         )
     arguments = {**policy.env_kwargs, **env_kwargs}
     with _place(name, replace_existing) as path:
-        noisy = _with_noise(policy, action_noise, seed)
-        recorded = _play(noisy, episodes, seed, arguments, report)
+        recorded = _play(policy, episodes, seed, (action_noise, slowdown), arguments, report)
         low, high = _scores(policy, arguments)
-        _write(name, noisy, arguments, recorded, low, high)
+        _write(name, policy, (action_noise, slowdown), arguments, recorded, low, high)
     returns = [float(one.rewards.sum(dtype=float)) for one in recorded]
     return Written(
         name, path, episodes, sum(len(one.rewards) for one in recorded),
@@ -154,31 +162,27 @@ def write_dataset(
     )  # fmt: skip
 
 
-def _with_noise(policy: Policy, deviation: float, seed: int) -> Policy:
-    """The policy, with normal noise on its actions; the same for a seed and number of episodes."""
-    if deviation == 0.0:
-        return policy
-    draw = np.random.default_rng(seed)
-
-    def act(observation: dict[str, Array]) -> Array:
-        action = np.asarray(policy.act(observation))
-        return action + deviation * draw.standard_normal(action.shape)
-
-    return replace(policy, act=act, name=f"{policy.name} with action noise {deviation:g}")
-
-
 def _play(
     policy: Policy,
     episodes: int,
     seed: int,
+    disturbance: tuple[float, float],
     arguments: dict[str, Any],
     report: Callable[[int], None],
 ) -> list[Recorded]:
-    worlds = min(episodes, WORLDS)
+    worlds, draw = min(episodes, WORLDS), np.random.default_rng(seed)
+    noise, slowdown = disturbance
+
+    def disturb(actions: Array) -> Array:
+        slowed = 1.0 - slowdown * draw.random((len(actions), 1))
+        moved = np.where(moves, slowed * actions, actions)
+        return moved + noise * draw.standard_normal(actions.shape)
+
     recorded: list[Recorded] = []
     with closing(make_vector_env(policy.env_id, worlds, **arguments)) as envs:
+        moves = np.array([name != "grip" for name in envs.task.actions])  # type: ignore[attr-defined]
         for first in range(0, episodes, worlds):
-            recorded += record_episodes(envs, policy.act, seed + first, report)
+            recorded += record_episodes(envs, policy.act, seed + first, report, disturb)
     return recorded[:episodes]
 
 
@@ -207,6 +211,7 @@ def _mean_return(policy: Policy) -> float:
 def _write(
     name: str,
     policy: Policy,
+    disturbance: tuple[float, float],
     arguments: dict[str, Any],
     recorded: Sequence[Recorded],
     low: float,
@@ -216,21 +221,33 @@ def _write(
         EpisodeBuffer(
             id=n, seed=one.seed, observations=one.observations, actions=one.actions,
             rewards=list(one.rewards), terminations=list(one.terminated),
-            truncations=list(one.truncated), infos={"is_success": one.success},
+            truncations=list(one.truncated), infos=_infos(one),
         )
         for n, one in enumerate(recorded)
     ]  # fmt: skip
+    words = [
+        f"{word} {value:g}"
+        for word, value in zip(("action noise", "slowdown"), disturbance, strict=True)
+        if value
+    ]
+    actor = f"{policy.name} with {' and '.join(words)}" if words else policy.name
     with closing(make_single_env(policy.env_id, **arguments)) as env, warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".* is set to None")
         minari.create_dataset_from_buffers(
-            name, buffers, env=env.spec, eval_env=env.spec, algorithm_name=policy.name,
+            name, buffers, env=env.spec, eval_env=env.spec, algorithm_name=actor,
             observation_space=env.observation_space, action_space=env.action_space,
             ref_min_score=None if high is None else low, ref_max_score=high,
             num_episodes_average_score=REFERENCE_EPISODES,
-            description=f"{len(recorded)} episodes of {policy.env_id} by {policy.name}; each "
+            description=f"{len(recorded)} episodes of {policy.env_id} by {actor}; each "
             "starts with reset(seed=...) of the seed in its metadata",
             requirements=[f"rigid-envs=={_version()}"], jpeg_encoding=False,
         )  # fmt: skip
+
+
+def _infos(episode: Recorded) -> dict[str, Array]:
+    """What Minari stores beside each observation; the first of a reset, which has no action."""
+    intended = np.concatenate([np.full_like(episode.intended[:1], np.nan), episode.intended])
+    return {"is_success": episode.success, "intended_action": intended}
 
 
 def _version() -> str:

@@ -16,6 +16,7 @@ class Recorded(NamedTuple):
         seed: `reset(seed=seed)` of the single environment starts it.
         observations: for each key, [T + 1, ...].
         actions: [T, action_dim], as the environment took them.
+        intended: [T, action_dim], what the policy chose: without noise.
         rewards: [T].
         terminated: [T] bool.
         truncated: [T] bool.
@@ -25,6 +26,7 @@ class Recorded(NamedTuple):
     seed: int
     observations: dict[str, Array]
     actions: Array
+    intended: Array
     rewards: Array
     terminated: Array
     truncated: Array
@@ -36,6 +38,7 @@ def record_episodes(
     act: Callable[[dict[str, Array]], Array],
     seed: int,
     advance: Callable[[int], None] = lambda _: None,
+    disturb: Callable[[Array], Array] = lambda action: action,
 ) -> list[Recorded]:
     """Plays until the first episode of every world has ended, and returns it.
 
@@ -44,16 +47,22 @@ def record_episodes(
         act: takes observations, a dict of [n, ...] arrays; returns actions [n, action_dim].
         seed: of the episode of the first world; the following ones count up.
         advance: called after each step with the number of episodes that ended.
+        disturb: adds noise to actions [n, action_dim].
     """
     count, space = envs.num_envs, envs.action_space
     dtype = getattr(envs.single_action_space, "dtype", np.float32)
+
+    def bounded(action: Array) -> Array:
+        return np.clip(np.asarray(action, dtype=dtype), space.low, space.high)  # type: ignore[attr-defined]
+
     observation, info = envs.reset(seed=seed)
     observations = [_copied(observation)]
     success = [np.array(info["is_success"], dtype=bool)]
     steps: list[tuple[Array, ...]] = []
     length = np.zeros(count, dtype=int)
     while (length == 0).any():
-        action = np.clip(np.asarray(act(observation), dtype=dtype), space.low, space.high)  # type: ignore[attr-defined]
+        intended = bounded(act(observation))
+        action = bounded(disturb(intended))
         observation, reward, terminated, truncated, info = envs.step(action)
         shown, solved = _copied(observation), np.array(info["is_success"], dtype=bool)
         ended = terminated | truncated
@@ -64,11 +73,11 @@ def record_episodes(
             solved[ended] = info["final_info"]["is_success"][ended]
         observations.append(shown)
         success.append(solved)
-        steps.append((action, reward.copy(), terminated.copy(), truncated.copy()))
+        steps.append((action, intended, reward.copy(), terminated.copy(), truncated.copy()))
         first = ended & (length == 0)
         length[first] = len(steps)
         advance(int(first.sum()))
-    actions, rewards, terminated, truncated = (np.stack(one) for one in zip(*steps, strict=True))
+    actions, intents, rewards, terminated, truncated = map(np.stack, zip(*steps, strict=True))
     frames = {key: np.stack([o[key] for o in observations]) for key in observations[0]}
     solved = np.stack(success)
     return [
@@ -76,6 +85,7 @@ def record_episodes(
             seed + w,
             {key: values[: n + 1, w] for key, values in frames.items()},
             actions[:n, w],
+            intents[:n, w],
             rewards[:n, w],
             terminated[:n, w],
             truncated[:n, w],

@@ -18,6 +18,7 @@ from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import GoalOffsets
 from training.policies.policy_file import SUFFIX, PolicyFile, load_policy_file
 from training.policies.policy_header import Environment, Header, Network, Normalization, Success
+from training.policies.symlog import SymlogOffsets
 from training.runs.run_folder import RunFolder, atomic_write, git_commit, package_versions
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
@@ -94,7 +95,7 @@ def policy_file_of(
         raise UsageError(
             f"policy files support dict observations and box actions, not {space}, {actions}"
         )
-    layers, activation = _layers(model)
+    layers, activation, features = _layers(model)
     env_id = config.env_id.rpartition(":")[2]  # without "module:"
     version = re.search(r"-v(\d+)$", env_id)
     if version is None:
@@ -111,6 +112,7 @@ def policy_file_of(
             squashing=_squashing(model.policy),
             low=[float(x) for x in actions.low.flatten()],
             high=[float(x) for x in actions.high.flatten()],
+            features=features,
         ),
         normalization=scaling,
         success=success,
@@ -129,8 +131,8 @@ def _squashing(policy: Any) -> str:
     return "tanh" if isinstance(policy, SACPolicy) else "clip"
 
 
-def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], str]:
-    """The actor's weights and biases by layer, and the name of the activation."""
+def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], str, str]:
+    """The actor's weights and biases by layer, and the names of activation and features."""
     policy: Any = model.policy
     if isinstance(model, PPO):
         extractor = policy.pi_features_extractor
@@ -142,8 +144,8 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
         raise UsageError(f"policy files support PPO and SAC, not {type(model).__name__}")
     between = [module for module in modules if not isinstance(module, torch.nn.Linear)]
     kinds = {type(module) for module in between}
-    offsets = isinstance(extractor, GoalOffsets)
-    flat = offsets or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
+    own = isinstance(extractor, GoalOffsets | SymlogOffsets)
+    flat = own or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
     alternate = len(modules) == 2 * len(between) + 1
     if not flat or not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
         raise UsageError(
@@ -151,9 +153,14 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
         )
     linear = [module for module in modules if isinstance(module, torch.nn.Linear)]
     layers = [(_numbers(one.weight), _numbers(one.bias)) for one in linear]
-    if offsets:  # a linear map: merge it into the first layer
+    features = "linear"
+    if isinstance(extractor, GoalOffsets):  # a linear map: merge it into the first layer
         layers[0] = (_numbers(linear[0].weight.double() @ extractor.matrix.double()), layers[0][1])
-    return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh"
+    if isinstance(extractor, SymlogOffsets):
+        matrix = _numbers(extractor.matrix)
+        layers.insert(0, (matrix, np.zeros(len(matrix), np.float32)))
+        features = "symlog"
+    return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh", features
 
 
 def _statistics(env: VecNormalize | None) -> tuple[Normalization | None, Any, Any]:

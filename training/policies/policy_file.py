@@ -40,6 +40,7 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+    "symlog": lambda x: np.sign(x) * np.log1p(np.abs(x)),
 }
 SQUASHING_FUNCTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
@@ -100,10 +101,14 @@ class PolicyFile:
                 value = np.clip((value - self.mean[key]) / scale, -clip, clip)
             parts.append(value.astype(np.float32).reshape(len(value), -1))
         x = np.concatenate(parts, axis=1).astype(np.float64)
-        activation = ACTIVATIONS[header.network.activation]
+        names = [header.network.activation] * len(self.layers)
+        if header.network.features != "linear":
+            names[0] = header.network.features
         with _BLAS.limit(limits=1, user_api="blas"):
             for number, (weights, biases) in enumerate(self.layers):
-                x = (activation(x) if number else x) @ weights.T.astype(np.float64) + biases
+                if number:
+                    x = ACTIVATIONS[names[number - 1]](x)
+                x = x @ weights.T.astype(np.float64) + biases
         low, high = np.array(header.network.low), np.array(header.network.high)
         if header.network.squashing in SQUASHING_FUNCTIONS:
             x = low + 0.5 * (SQUASHING_FUNCTIONS[header.network.squashing](x) + 1.0) * (high - low)

@@ -1,5 +1,6 @@
 """The header of a policy file: its fields, and a reader that validates every value."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,6 +9,8 @@ from typing import Any
 SQUASHING = {"ppo": ("clip", "softsign"), "sac": ("tanh",)}
 """How the network's output becomes an action, by algorithm: clipped to the bounds, or squashed."""
 ACTIVATION_NAMES = ("tanh", "relu", "elu")
+FEATURES = ("linear", "symlog")
+"""What follows the first layer: "linear" means `activation`, as after the others."""
 
 
 class InvalidHeader(ValueError):
@@ -40,6 +43,9 @@ class Network:
     """Lower bounds of the action."""
     high: list[float]
     """Upper bounds of the action."""
+    features: str = "linear"
+    """"symlog": the first layer gives features, and sign(x) ln(1 + |x|) follows it in place of the
+    activation. Files without this entry have "linear"."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +161,7 @@ def _network(value: Any, algorithm: str) -> Network:
         _one_of(fields["squashing"], "network.squashing", SQUASHING[algorithm]),
         [_number(x, "network.low") for x in _list(fields["low"], "network.low")],
         [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
+        _one_of(fields["features"], "network.features", FEATURES),
     )
     if len(network.widths) < 2 or min(network.widths) < 1:
         raise InvalidHeader(
@@ -197,8 +204,14 @@ def _success(value: Any) -> Success:
 
 
 def _fields(value: Any, name: str, kind: Any) -> dict[str, Any]:
-    """A mapping with exactly the fields of a dataclass."""
-    mapping, expected = _mapping(value, name), list(kind.__dataclass_fields__)
+    """A mapping with exactly the fields of a dataclass; those with a default may be missing."""
+    expected = list(kind.__dataclass_fields__)
+    defaults = {
+        field.name: field.default
+        for field in dataclasses.fields(kind)
+        if field.default is not dataclasses.MISSING
+    }
+    mapping = defaults | _mapping(value, name)
     if set(mapping) != set(expected):
         differing = ", ".join(sorted(set(mapping) ^ set(expected)))
         raise InvalidHeader(

@@ -38,9 +38,8 @@ def shipped_policy(env_id: str) -> Policy:
     plain = plain_id(env_id)
     path = folders / f"{plain.replace('/', '-')}_seed0" / f"policy{SUFFIX}"
     if not path.is_file():
-        known = sorted(
-            p.parent.name.removesuffix("_seed0") for p in folders.glob(f"*_seed0/*{SUFFIX}")
-        )
+        files = folders.glob(f"*-v[0-9]_seed0/*{SUFFIX}")
+        known = sorted(file.parent.name.removesuffix("_seed0") for file in files)
         raise UsageError(
             f"no trained policy of {env_id!r} comes with the package; there are "
             f"{', '.join(name.replace('-', '/', 1) for name in known)}"

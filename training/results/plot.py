@@ -37,8 +37,8 @@ def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None
         The path of the PNG.
 
     Raises:
-        UsageError: A run has no learning curve yet or is given twice, or the runs differ in more
-            than their seed.
+        UsageError: A run has no learning curve yet or is given twice, the runs differ in more than
+            their seed, or the image cannot be written.
     """
     curves = [read_learning_curve(folder) for folder in folders]
     configs = [folder.config() for folder in folders]
@@ -48,6 +48,8 @@ def plot_learning_curves(folders: Sequence[RunFolder], image: Path | None = None
         image = folders[0].path / "learning_curve.png"
     elif image is None:
         image = folders[0].path.parent / f"{folder_name(first.env_id)}_learning_curves.png"
+    if image.suffix != ".png":
+        raise UsageError(f"output is {str(image)!r}, should end in .png")
     seeds = ", ".join(str(config.seed) for config in configs)
     word = "seeds" if len(configs) > 1 else "seed"
     draw_learning_curves(
@@ -109,8 +111,11 @@ def draw_learning_curves(
             lines, names, loc="outside upper right", ncols=min(len(names), 4), fontsize="small"
         )
     figure.suptitle(title, x=0.01, ha="left")
-    image.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(image, dpi=120)
+    try:
+        image.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(image, dpi=120)
+    except OSError as error:
+        raise UsageError(f"{image} cannot be written: {error.strerror}") from None
 
 
 def mean_and_spread(

@@ -15,11 +15,14 @@ from stable_baselines3.her import HerReplayBuffer
 from training.datasets.demonstrations import read_demonstrations
 from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import OffsetPolicy
+from training.policies.symlog import SymlogPolicy
+from training.sb3.cloning import CloningSAC
 from training.sb3.demonstration_buffers import DemonstrationBuffer, DemonstrationHerBuffer
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.config import (
     BOUNDED_POLICY,
     OFFSET_POLICY,
+    SYMLOG_POLICY,
     PPOConfig,
     SACConfig,
     TrainConfig,
@@ -32,6 +35,7 @@ SUCCESS_WINDOW = 1000
 POLICIES: dict[str, type[BasePolicy]] = {
     BOUNDED_POLICY: BoundedPolicy,
     OFFSET_POLICY: OffsetPolicy,
+    SYMLOG_POLICY: SymlogPolicy,
 }
 ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
 
@@ -111,7 +115,18 @@ def _model(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
             target_kl=config.target_kl,
         )
     assert isinstance(config, SACConfig)
-    return SAC(
+    kind: Any = SAC
+    if config.cloning_steps:
+        if config.demonstrations is None:
+            raise UsageError(
+                f"cloning_steps is {config.cloning_steps}, which requires demonstrations: record "
+                "them with `rigid-envs dataset`, and train with --demonstrations NAME"
+            )
+        kind = CloningSAC
+        common["cloning_steps"], common["cloning_weight"] = (
+            config.cloning_steps, config.cloning_weight,
+        )  # fmt: skip
+    return kind(
         **common,
         buffer_size=config.buffer_size,
         learning_starts=config.learning_starts,

@@ -8,6 +8,7 @@ never overwritten; with HER, their goals are replaced as those of other episodes
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3.common.buffers import DictReplayBuffer
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples
@@ -33,6 +34,21 @@ class DemonstrationBuffer(DictReplayBuffer):
         self.fraction = fraction
         self.demonstrations = self._empty(sum(len(episode.rewards) for episode in episodes))
         _fill(self.demonstrations, episodes)
+        self._intended = np.concatenate([episode.intended for episode in episodes])
+        self._seen = {
+            key: np.concatenate([episode.observations[key][:-1] for episode in episodes])
+            for key in episodes[0].observations
+        }
+
+    def sample_intended(
+        self, batch_size: int, env: VecNormalize | None = None
+    ) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+        """Demonstrated observations, and the actions that were intended there, without noise."""
+        rows = np.random.randint(len(self._intended), size=batch_size)  # noqa: NPY002  (as SB3's)
+        seen: Any = {key: values[rows] for key, values in self._seen.items()}
+        seen = self._normalize_obs(seen, env)
+        tensors = {key: self.to_torch(values) for key, values in seen.items()}
+        return tensors, self.to_torch(self._intended[rows])
 
     def _empty(self, steps: int) -> DictReplayBuffer:
         """A buffer for the demonstrations."""

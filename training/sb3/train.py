@@ -48,6 +48,8 @@ class TrainResult:
     """Fraction of the last training episodes that succeeded, with sampled actions."""
     interrupted: bool
     """Whether Ctrl-C ended the run."""
+    target_reached: float | None = None
+    """Success of the mean action in the evaluation that ended the run before its last step."""
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,8 @@ def _learn(
         progress.close()
     total = elapsed()
     save(finished=not interrupted)
+    rates = [one.evaluation.rate for one in callbacks if isinstance(one, StopAtSuccess)
+             and one.reached]  # fmt: skip
     with _reporting_os_errors(folder):
         model.logger.close()
     return TrainResult(
@@ -218,6 +222,7 @@ def _learn(
         environment_time_fraction=None if total.in_envs is None else total.in_envs / total.total,
         success_rate=success_rate(model),
         interrupted=interrupted,
+        target_reached=rates[0] if rates else None,
     )
 
 

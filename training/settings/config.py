@@ -17,6 +17,7 @@ from training.settings.settings import (
     boolean,
     choice,
     entropy_coefficient,
+    index_pairs,
     integer,
     layer_widths,
     mapping,
@@ -31,6 +32,8 @@ from training.settings.settings import (
 
 BOUNDED_POLICY = "training.policies.bounded.BoundedPolicy"
 OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
+SYMLOG_POLICY = "training.policies.symlog.SymlogPolicy"
+SAC_POLICIES = (OFFSET_POLICY, SYMLOG_POLICY)
 """Import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3."""
 WRAPPERS = (
     "rigid_envs.wrappers.ActionPenalty",
@@ -51,6 +54,7 @@ NETWORK_RULES = {
     "activation": choice("tanh", "relu", "elu"),
     "log_std_init": number(),
     "min_std": number(at_least=0),
+    "differences": index_pairs,
 }
 HER_RULES = {
     "n_sampled_goal": integer(1),
@@ -101,7 +105,8 @@ class TrainConfig:
     """Policy class of Stable-Baselines3 for dict observations."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
-    relu for SAC, as in Stable-Baselines3), min_std (BoundedPolicy only)."""
+    relu for SAC, as in Stable-Baselines3), min_std (BoundedPolicy only), differences (SymlogPolicy
+    only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -242,9 +247,9 @@ class SACConfig(TrainConfig):
 
     algo: ClassVar[str] = "sac"
 
-    policy: str = setting(choice("MultiInputPolicy", OFFSET_POLICY), "MultiInputPolicy")
+    policy: str = setting(choice("MultiInputPolicy", *SAC_POLICIES), "MultiInputPolicy")
     """Policy class; training.policies.offsets.OffsetPolicy observes the goal relative to the
-    achieved one."""
+    achieved one, training.policies.symlog.SymlogPolicy also on a logarithmic scale."""
     buffer_size: int = setting(integer(1), 1_000_000)
     """Capacity of the replay buffer in transitions, summed over the worlds."""
     learning_starts: int = setting(integer(0), 1000)
@@ -265,6 +270,11 @@ class SACConfig(TrainConfig):
     """Name of a Minari dataset of the environment; null for no demonstrations."""
     demonstration_fraction: float = setting(number(above=0, at_most=0.9), 0.5)
     """Part of each batch that is sampled from the demonstrations."""
+    cloning_steps: int = setting(integer(0), 0)
+    """Gradient steps in which the actor only imitates the demonstrations, before the first update;
+    afterwards it still does, with `cloning_weight`. 0: SAC's own actor."""
+    cloning_weight: float = setting(number(at_least=0), 50.0)
+    """Weight of the squared distance to demonstrated actions, relative to the critic's value."""
 
     @property
     def demonstration_batch(self) -> int:
@@ -273,6 +283,10 @@ class SACConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
+        if "differences" in self.policy_kwargs and self.policy != SYMLOG_POLICY:
+            raise UsageError(
+                f"{where}: policy_kwargs: differences requires policy: {SYMLOG_POLICY}"
+            )
         if self.demonstrations is not None and self.env_wrapper is not None:
             raise UsageError(
                 f"{where}: env_wrapper cannot be used with demonstrations, whose rewards are those "

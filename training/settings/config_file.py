@@ -21,7 +21,7 @@ CONFIG_FOLDER = data_folder("configs", "configs")
 """The packaged settings."""
 SECTIONS = (
     "eval_env_kwargs", "eval_freq", "target_success_rate", "finetune_timesteps",
-    "finetune_env_kwargs",
+    "finetune_env_kwargs", "cloning_steps", "cloning_weight",
 )  # fmt: skip
 """This project's own settings that may be top-level sections of a file."""
 

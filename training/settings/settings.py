@@ -134,6 +134,18 @@ def layer_widths(value: Any) -> list[int]:
         raise InvalidValue("a list of layer widths, as in [64, 64]") from None
 
 
+def index_pairs(value: Any) -> list[list[int]]:
+    """Pairs of indices, as in [[8, 0], [9, 1]]."""
+    try:
+        pairs = [[integer(0)(index) for index in _check_type(list, pair)]
+                 for pair in _check_type(list, value)]  # fmt: skip
+    except InvalidValue:
+        pairs = [[]]
+    if any(len(pair) != 2 for pair in pairs):
+        raise InvalidValue("a list of pairs of indices, as in [[8, 0], [9, 1]]")
+    return pairs
+
+
 def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
     """A mapping with text keys; with `keys`, only those are valid, each value under its rule."""
 

@@ -117,6 +117,6 @@ def test_ray_names_its_extra_where_it_is_missing(words, monkeypatch, capsys, tmp
         assert cli.main([*words, *more]) == 2
         assert capsys.readouterr().err == (
             "error: this command requires no_such_package; "
-            'to install: pip install "rigid-envs[ray]"\n'
+            'to install, in a clone: pip install -c constraints.txt ".[ray]"\n'
         )
     assert not (tmp_path / "runs").exists()

@@ -104,5 +104,6 @@ def test_a_missing_package_names_the_extra(capsys, monkeypatch):
     monkeypatch.setattr(extras, "VIEW_EXTRA", ("no_such_viser",))
     assert cli.main(["view"]) == 2
     assert capsys.readouterr().err == (
-        'error: this command requires no_such_viser; to install: pip install "rigid-envs[view]"\n'
+        "error: this command requires no_such_viser; to install, in a clone: "
+        'pip install -c constraints.txt ".[view]"\n'
     )

@@ -138,7 +138,7 @@ def test_settings_that_contradict_demonstrations_raise(config):
 
 def test_without_minari_the_extra_is_named(config, monkeypatch):
     monkeypatch.setattr(demonstrations.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(UsageError, match=r'pip install "rigid-envs\[data\]"'):
+    with pytest.raises(UsageError, match=r'-c constraints.txt "\.\[data\]"'):
         read_demonstrations(config)
 
 

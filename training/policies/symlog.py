@@ -1,0 +1,93 @@
+"""A SAC policy whose features tell millimetres apart near zero and still cover metres."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.sac.policies import MultiInputPolicy
+
+from training.settings.errors import UsageError
+
+UNITS = (0.1, 0.002)
+"""Each quantity is divided by each of these: a tenth of a metre, and two millimetres."""
+
+
+def symlog(x: torch.Tensor) -> torch.Tensor:
+    """sign(x) ln(1 + |x|): linear near zero, logarithmic far from it."""
+    return torch.sign(x) * torch.log1p(torch.abs(x))
+
+
+class SymlogOffsets(BaseFeaturesExtractor):
+    """Features: symlog(x / unit) of each x and each of `UNITS`.
+
+    x are the components of the observation, of desired minus achieved goal, and of the given
+    differences. A cube is released within a millimetre of its place but carried from tenths of a
+    metre away; a network of few units cannot resolve both in one linear scale. Symlog is that of
+    Hafner et al., Mastering diverse domains through world models (2023).
+
+    The extractor has no parameters, and a policy file stores `matrix` as a layer of its own.
+
+    Args:
+        space: Observation space of a goal environment.
+        differences: Pairs [a, b] of components of `observation`, whose difference a - b is an x
+            too.
+
+    Raises:
+        UsageError: The space has no goals, or the observation has no such component.
+    """
+
+    matrix: torch.Tensor
+
+    def __init__(self, space: spaces.Dict, differences: Sequence[Sequence[int]] = ()):
+        sizes = {key: int(np.prod(one.shape or ())) for key, one in space.spaces.items()}
+        if set(sizes) != {"observation", "achieved_goal", "desired_goal"}:
+            raise UsageError(f"SymlogPolicy requires observations with goals, not {space}")
+        observed, goal = sizes["observation"], sizes["desired_goal"]
+        if any(not 0 <= index < observed for pair in differences for index in pair):
+            raise UsageError(
+                f"differences is {differences}, should have pairs of components of the "
+                f"observation, 0 to {observed - 1}"
+            )
+        rows = observed + goal + len(differences)
+        super().__init__(space, rows * len(UNITS))
+        self.keys = list(sizes)
+        ends = np.cumsum(list(sizes.values()))
+        first = dict(zip(sizes, ends - list(sizes.values()), strict=True))
+        x = torch.zeros(rows, int(ends[-1]))
+        for row in range(observed):
+            x[row, first["observation"] + row] = 1.0
+        for row in range(goal):
+            x[observed + row, first["desired_goal"] + row] = 1.0
+            x[observed + row, first["achieved_goal"] + row] = -1.0
+        for row, (a, b) in enumerate(differences, start=observed + goal):
+            x[row, first["observation"] + a] = 1.0
+            x[row, first["observation"] + b] = -1.0
+        self.register_buffer("matrix", torch.cat([x / unit for unit in UNITS]))
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        """Features [n, len(UNITS) (observation + goal + differences)]."""
+        parts = [observations[key].flatten(start_dim=1) for key in self.keys]
+        return symlog(torch.cat(parts, dim=1) @ self.matrix.T)
+
+
+class SymlogPolicy(MultiInputPolicy):
+    """Stable-Baselines3's SAC policy for goal environments, with `SymlogOffsets` as its features.
+
+    Args:
+        *args: As for Stable-Baselines3's policy.
+        differences: As for `SymlogOffsets`.
+        **kwargs: As for Stable-Baselines3's policy.
+    """
+
+    def __init__(self, *args: Any, differences: Sequence[Sequence[int]] = (), **kwargs: Any):
+        super().__init__(
+            *args,
+            **{
+                **kwargs,
+                "features_extractor_class": SymlogOffsets,
+                "features_extractor_kwargs": {"differences": differences},
+            },
+        )
