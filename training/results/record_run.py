@@ -16,7 +16,7 @@ from training.results.plot import read_learning_curve
 from training.results.result import RESULT, Result, parse_result, read_results, task_name
 from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
-from training.settings.config import TrainConfig
+from training.settings.config import SACConfig, TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 
@@ -165,11 +165,15 @@ def _rate(outcome: np.ndarray) -> dict[str, float]:
 def _command(config: TrainConfig) -> str:
     """The shortest command that repeats the training, in the repository's folder."""
     words = f"rigid-envs train --algo {config.algo} --env {config.env_id}"
+    given: dict[str, Any] = {"seed": config.seed}
+    if isinstance(config, SACConfig) and config.demonstrations is not None:
+        given["demonstrations"] = config.demonstrations
+        words += f" --demonstrations {config.demonstrations}"
     try:
         packaged = load_config(config.algo, config.env_id)
-        if packaged.replace(seed=config.seed) == config:
+        if packaged.replace(**given) == config:
             return f"{words} --seed {config.seed}"
-        if packaged.replace(seed=config.seed, n_timesteps=config.n_timesteps) == config:
+        if packaged.replace(**given, n_timesteps=config.n_timesteps) == config:
             return f"{words} --seed {config.seed} -n {config.n_timesteps}"
     except UsageError:  # there are no packaged settings for it
         pass

@@ -57,6 +57,9 @@ class TrainingProgress(BaseCallback):
         self.steps_before = self.model.num_timesteps
         self.started = self.shown = self.printed = time.perf_counter()
         self.bar.start()
+        steps = getattr(self.model, "cloning_steps", 0)
+        if steps and self.steps_before == 0:
+            self.console.print(f"first, {steps:,} gradient steps imitate the demonstrations")
 
     def _on_step(self) -> bool:
         now = time.perf_counter()

@@ -11,7 +11,7 @@ from training.datasets.minari_store import default_id, random_policy, write_data
 from training.policies.policy import scripted_policy  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
 
-PUSH, THROW = "RigidEnvs/Push-v0", "RigidEnvs/Throw-v0"
+PUSH, STACK, THROW = (f"RigidEnvs/{task}-v0" for task in ("Push", "Stack", "Throw"))
 FAST = {"fidelity": "fast"}
 
 
@@ -92,6 +92,25 @@ def test_scores_are_those_of_random_actions_and_of_the_policy():
     assert drawn.mean_return < 0.5 * written.mean_return
 
 
+def test_slowed_movements_and_what_was_intended_are_recorded():
+    policy = scripted_policy(STACK, **FAST)
+    written = write_dataset(policy, 20, slowdown=1.0, seed=7)
+    assert written.dataset_id == "rigid-envs/stack/scripted-slowdown-1-0-v0"
+    dataset = minari.load_dataset(written.dataset_id)
+    assert dataset.storage.metadata["algorithm_name"] == "scripted with slowdown 1"
+    for episode in dataset:
+        intended = episode.infos["intended_action"]
+        assert np.isnan(intended[0]).all()
+        seen = {key: values[:-1] for key, values in episode.observations.items()}
+        np.testing.assert_allclose(intended[1:], policy.act(seen), rtol=1e-6)
+        actions, moves = episode.actions, np.abs(intended[1:, :3]) > 1e-3
+        np.testing.assert_array_equal(actions[:, 3], intended[1:, 3])  # the grip
+        part = actions[:, :3][moves] / intended[1:, :3][moves]
+        assert part.min() >= 0.0
+        assert part.max() <= 1.0
+        assert 0.4 < part.mean() < 0.6
+
+
 def test_noise_on_actions_is_recorded_as_the_environment_took_it():
     policy = scripted_policy(PUSH, **FAST)
     plain = write_dataset(policy, 20, "plain-v0")
@@ -158,6 +177,7 @@ def test_names(name, env_id, policy, expected):
         (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--episodes", "0"], "should be an integer of at least 1"),
         (["--action-noise", "-0.1"], "action_noise is -0.1, should be a number of at least 0"),
+        (["--slowdown", "1.5"], "slowdown is 1.5, should be a number from 0 to 1"),
         (["--action-noise", "nan"], "action_noise is nan, should be a number of at least 0"),
         (["--policy", "nowhere"], "nowhere"),
         (["--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
