@@ -28,6 +28,12 @@ def test_ppo_runs_for_a_few_updates(ppo, capsys):
     assert capsys.readouterr().out.count("solved") == 3
 
 
+def test_ppo_refuses_less_than_one_update(ppo, capsys):
+    with pytest.raises(SystemExit):
+        ppo["parse"](["--total-steps", "100"])
+    assert "--total-steps is 100, should be at least" in capsys.readouterr().err
+
+
 def test_its_normaliser_has_the_mean_and_variance_of_all_that_it_saw(ppo):
     rng, normalizer = np.random.default_rng(0), ppo["Normalizer"](3)
     batches = [rng.normal(5.0, 2.0, (n, 3)) for n in (1, 10, 300)]

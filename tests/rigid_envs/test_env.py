@@ -326,6 +326,14 @@ def test_stepping_before_the_first_reset_raises():
         make().step(ZERO)
 
 
+@pytest.mark.parametrize("shape", [(2,), (5,), (4, 2), ()])
+@pytest.mark.parametrize("name", ["compute_reward", "compute_terminated"])
+def test_goals_of_another_size_raise(env, name, shape):
+    goal = np.zeros(shape)
+    with pytest.raises(ValueError, match=r"achieved_goal must have shape \[\.\.\., 3\], got "):
+        getattr(env.unwrapped, name)(goal, goal, {})
+
+
 @pytest.mark.parametrize("state", [None, {}, 3, {"version": 1}])
 def test_an_invalid_state_raises(env, state):
     assert_raises(env, lambda: env.set_state(state), ValueError, "state must be a dict with")

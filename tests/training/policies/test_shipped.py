@@ -16,8 +16,12 @@ def test_each_task_has_one(task):
 
 
 def test_another_environment_has_none_and_the_message_says_which_do():
-    with pytest.raises(UsageError, match=r"comes with the package; there are RigidEnvs/Push-v0, "):
+    with pytest.raises(
+        UsageError, match=r"comes with the package; there are RigidEnvs/Push-v0, "
+    ) as e:
         shipped_policy("RigidEnvs/Pull-v0")
+    for env_id in str(e.value).partition("there are ")[2].split(", "):
+        assert shipped_policy(env_id).env_id == env_id
 
 
 def test_it_is_evaluated_by_name(capsys):

@@ -60,6 +60,15 @@ def test_command_accepts_one_run_or_several(seeds, tmp_path, capsys):
     assert capsys.readouterr().out == f"{seeds[0].path / 'learning_curve.png'}\n"
 
 
+def test_outputs_that_cannot_be_written_are_named(seeds, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    for output, message in (("a.txt", "should end in .png"), ("file/a.png", "cannot be written")):
+        assert cli.main(["plot", str(seeds[0].path), "-o", str(tmp_path / output)]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1
+
+
 def test_runs_that_differ_in_more_than_their_seed_raise(seeds, tmp_path, quick_ppo, quick_sac):
     rows = "80,1,0.1\n160,2,0.5\n"
     other = quick_ppo.replace(env_kwargs={"reward_type": "sparse"})
