@@ -161,7 +161,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--env", default="RigidEnvs/PushDense-v0", help="id (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--total-steps", type=int, default=5_000_000, help="whole updates of them")
+    parser.add_argument(
+        "--total-steps", type=int, default=5_000_000, help="rounded down to whole updates"
+    )
     parser.add_argument("--num-envs", type=int, default=1024)
     parser.add_argument("--num-steps", type=int, default=50, help="of a world for an update")
     parser.add_argument("--batch-size", type=int, default=6400)

@@ -18,8 +18,8 @@ from optuna.trial import TrialState
 from training.results.result import task_name
 from training.results.trial import Stopped, success_of
 from training.runs.run_folder import folder_name
+from training.sb3.checks import check_settings
 from training.settings.config import TrainConfig
-from training.settings.environments import make_vector_env
 from training.settings.errors import UsageError
 from training.settings.search_space import draw, with_drawn
 
@@ -82,7 +82,7 @@ def tune(
         UsageError: The environment rejects its arguments, the database cannot be used, the study
             was started with other settings, there is no such cluster, or every trial has failed.
     """
-    make_vector_env(config.env_id, 1, **config.env_kwargs).close()
+    check_settings(config)
     search = _Search(config, trials, episodes, device, num_threads)
     if ray is None:
         study = search.study = _study(config, log_folder, storage, study_name, episodes)

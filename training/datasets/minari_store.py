@@ -96,7 +96,7 @@ def default_id(env_id: str, policy: str, action_noise: float = 0.0, slowdown: fl
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
     algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
     for word, value in (("noise", action_noise), ("slowdown", slowdown)):
-        algorithm += re.sub(r"[^\w]+", "-", f"-{word}-{value!r}") if value else ""
+        algorithm += re.sub(r"[^\w]+", "-", f"-{word}-{float(value)!r}") if value else ""
     return f"rigid-envs/{words}/{algorithm}-v0"
 
 
@@ -117,7 +117,7 @@ def write_dataset(
     Args:
         policy: what acts.
         episodes: their number.
-        dataset_id: (namespace/)name-v0; by default from the environment, the policy and the noise.
+        dataset_id: (namespace/)name-v0; by default from environment, policy, noise and slowdown.
         seed: of the first episode.
         action_noise: standard deviation of normal noise on the actions, whose bounds are 1. What
             is recorded as actions is what the environment took, clipped to its bounds; so the

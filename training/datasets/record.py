@@ -16,7 +16,7 @@ class Recorded(NamedTuple):
         seed: `reset(seed=seed)` of the single environment starts it.
         observations: for each key, [T + 1, ...].
         actions: [T, action_dim], as the environment took them.
-        intended: [T, action_dim], what the policy chose: without noise.
+        intended: [T, action_dim], what the policy chose, before it was disturbed.
         rewards: [T].
         terminated: [T] bool.
         truncated: [T] bool.
@@ -47,7 +47,7 @@ def record_episodes(
         act: takes observations, a dict of [n, ...] arrays; returns actions [n, action_dim].
         seed: of the episode of the first world; the following ones count up.
         advance: called after each step with the number of episodes that ended.
-        disturb: adds noise to actions [n, action_dim].
+        disturb: what becomes of actions [n, action_dim] that the policy chose.
     """
     count, space = envs.num_envs, envs.action_space
     dtype = getattr(envs.single_action_space, "dtype", np.float32)

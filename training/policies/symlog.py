@@ -24,7 +24,7 @@ class SymlogOffsets(BaseFeaturesExtractor):
     """Features: symlog(x / unit) of each x and each of `UNITS`.
 
     x are the components of the observation, of desired minus achieved goal, and of the given
-    differences. A cube is released within a millimetre of its place but carried from tenths of a
+    differences. A cube is released within 4 mm of its place but carried from tenths of a
     metre away; a network of few units cannot resolve both in one linear scale. Symlog is that of
     Hafner et al., Mastering diverse domains through world models (2023).
 

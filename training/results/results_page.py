@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium as gym
 
 from training.results.result import Result, changed_arguments, read_results
-from training.settings.config import TrainConfig
+from training.settings.config import SACConfig, TrainConfig
 from training.settings.config_file import load_config
 from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError
@@ -160,6 +160,8 @@ def _section(group: Sequence[Result], settings: TrainConfig) -> str:
         ]
         lines.append(f"| mean | {' | '.join(cells)} | |")
     lines += ["", "```sh", *(one.command for one in group), "```", ""]
+    if isinstance(settings, SACConfig) and settings.demonstrations is not None:
+        lines += ["The page of the environment says how the demonstrations are recorded.", ""]
     lines += [*_grouped(group, _evaluation), *_grouped(group, _versions), ""]
     curve, video = (path.relative_to(PAGE.parent).as_posix() for path in image_paths(first.kind))
     lines += [f"![Learning curves of {first.kind}]({curve})", ""]

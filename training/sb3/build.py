@@ -123,9 +123,10 @@ def _model(config: TrainConfig, env: VecEnv, device: str) -> BaseAlgorithm:
                 "them with `rigid-envs dataset`, and train with --demonstrations NAME"
             )
         kind = CloningSAC
-        common["cloning_steps"], common["cloning_weight"] = (
-            config.cloning_steps, config.cloning_weight,
-        )  # fmt: skip
+        common |= {
+            "cloning_steps": config.cloning_steps,
+            "cloning_weight": config.cloning_weight,
+        }
     return kind(
         **common,
         buffer_size=config.buffer_size,

@@ -1,4 +1,4 @@
-"""SAC whose actor also imitates demonstrations.
+"""Imitation of demonstrations, then TD3+BC: SAC's networks, but no entropy.
 
 With a sparse reward, SAC's actor leaves the demonstrated actions before the critic has learned that
 they are good: it climbs the critic's slope, which is wrong where no action was tried. Here it first
@@ -32,7 +32,9 @@ NOISE = 0.06
 
 
 class CloningSAC(SAC):
-    """SAC with demonstrations in its replay buffer, which its actor imitates.
+    """SAC's networks and buffers, with an actor that imitates demonstrations; see the module.
+
+    It has no entropy term: `ent_coef` has no effect.
 
     Args:
         *args: As for SAC.

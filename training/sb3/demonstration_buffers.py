@@ -35,17 +35,14 @@ class DemonstrationBuffer(DictReplayBuffer):
         self.demonstrations = self._empty(sum(len(episode.rewards) for episode in episodes))
         _fill(self.demonstrations, episodes)
         self._intended = np.concatenate([episode.intended for episode in episodes])
-        self._seen = {
-            key: np.concatenate([episode.observations[key][:-1] for episode in episodes])
-            for key in episodes[0].observations
-        }
 
     def sample_intended(
         self, batch_size: int, env: VecNormalize | None = None
     ) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
-        """Demonstrated observations, and the actions that were intended there, without noise."""
+        """Demonstrated observations, and the actions that were intended there."""
         rows = np.random.randint(len(self._intended), size=batch_size)  # noqa: NPY002  (as SB3's)
-        seen: Any = {key: values[rows] for key, values in self._seen.items()}
+        stored = self.demonstrations.observations
+        seen: Any = {key: values[rows, 0] for key, values in stored.items()}
         seen = self._normalize_obs(seen, env)
         tensors = {key: self.to_torch(values) for key, values in seen.items()}
         return tensors, self.to_torch(self._intended[rows])

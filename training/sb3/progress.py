@@ -58,7 +58,7 @@ class TrainingProgress(BaseCallback):
         self.started = self.shown = self.printed = time.perf_counter()
         self.bar.start()
         steps = getattr(self.model, "cloning_steps", 0)
-        if steps and self.steps_before == 0:
+        if steps and self.model._n_updates == 0:
             self.console.print(f"first, {steps:,} gradient steps imitate the demonstrations")
 
     def _on_step(self) -> bool:

@@ -271,8 +271,8 @@ class SACConfig(TrainConfig):
     demonstration_fraction: float = setting(number(above=0, at_most=0.9), 0.5)
     """Part of each batch that is sampled from the demonstrations."""
     cloning_steps: int = setting(integer(0), 0)
-    """Gradient steps in which the actor only imitates the demonstrations, before the first update;
-    afterwards it still does, with `cloning_weight`. 0: SAC's own actor."""
+    """Gradient steps in which the actor only imitates the demonstrations, before the first update.
+    Afterwards it imitates and climbs the critic, without entropy (TD3+BC). 0: SAC."""
     cloning_weight: float = setting(number(at_least=0), 50.0)
     """Weight of the squared distance to demonstrated actions, relative to the critic's value."""
 
@@ -286,6 +286,13 @@ class SACConfig(TrainConfig):
         if "differences" in self.policy_kwargs and self.policy != SYMLOG_POLICY:
             raise UsageError(
                 f"{where}: policy_kwargs: differences requires policy: {SYMLOG_POLICY}"
+            )
+        if self.cloning_steps:
+            self._check_cloning(where)
+        if self.normalize and self.policy == SYMLOG_POLICY:
+            raise UsageError(
+                f"{where}: normalize is True, should be false with {SYMLOG_POLICY}, whose units "
+                "are metres"
             )
         if self.demonstrations is not None and self.env_wrapper is not None:
             raise UsageError(
@@ -309,6 +316,18 @@ class SACConfig(TrainConfig):
                     f"{where}: env_wrapper: {name} cannot be used with HerReplayBuffer, which "
                     "computes rewards from goals alone"
                 )
+
+    def _check_cloning(self, where: str) -> None:
+        """Raises UsageError for settings that cloning contradicts."""
+        if self.normalize:
+            raise UsageError(
+                f"{where}: normalize is True, should be false with cloning_steps: the scales would "
+                "change after the actor is fitted"
+            )
+        if self.ent_coef != "auto":
+            raise UsageError(
+                f"{where}: ent_coef is {self.ent_coef}, but has no effect with cloning_steps"
+            )
 
 
 ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}

@@ -232,6 +232,7 @@ def test_arbitrary_header_raises_or_acts(saved, tmp_path, field, value):
     [
         ({"algorithm": "td4"}, "algorithm is 'td4', should be ppo or sac"),
         ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
+        ({"network__features": "symlog"}, "features is 'symlog', should be 'linear'"),
         ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         (

@@ -43,10 +43,9 @@ def test_a_saved_policy_keeps_its_features(tmp_path):
         assert torch.equal(kept.matrix, model.actor.features_extractor.matrix)
 
 
-@pytest.mark.parametrize("normalize", [False, True])
-def test_policy_file_acts_as_the_policy(quick_sac, tmp_path, normalize):
+def test_policy_file_acts_as_the_policy(quick_sac, tmp_path):
     kwargs = {**quick_sac.policy_kwargs, "differences": PAIRS}
-    config = quick_sac.replace(policy=SYMLOG_POLICY, normalize=normalize, policy_kwargs=kwargs)
+    config = quick_sac.replace(policy=SYMLOG_POLICY, policy_kwargs=kwargs)
     folder = train(config, tmp_path, quiet=True).folder
     content = load_policy_file(folder.policy)
     env = RigidVecEnv(ReachVectorEnv(50))
@@ -68,6 +67,8 @@ def test_wrong_spaces_components_and_algorithms_raise(quick_ppo, quick_sac):
         quick_ppo.replace(policy=SYMLOG_POLICY)
     with pytest.raises(UsageError, match=r"differences requires policy: training.policies.symlog"):
         quick_sac.replace(policy_kwargs={"differences": PAIRS})
+    with pytest.raises(UsageError, match=r"normalize is True, should be false with training.poli"):
+        quick_sac.replace(policy=SYMLOG_POLICY, normalize=True)
     for wrong in ([[1]], [[1, -1]], [1, 2], "8-0"):
         with pytest.raises(UsageError, match=r"a list of pairs of indices, as in \[\[8, 0\]"):
             quick_sac.replace(policy=SYMLOG_POLICY, policy_kwargs={"differences": wrong})

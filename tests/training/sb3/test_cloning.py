@@ -14,7 +14,7 @@ from training.results.evaluate import evaluate  # noqa: E402
 from training.sb3.build import worlds_and_model  # noqa: E402
 from training.sb3.cloning import NOISE  # noqa: E402
 from training.sb3.train import train  # noqa: E402
-from training.settings.config import SYMLOG_POLICY, SACConfig  # noqa: E402
+from training.settings.config import OFFSET_POLICY, SYMLOG_POLICY, SACConfig  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
 
 REACH, NAME = "RigidEnvs/Reach-v0", "reach/noisy-v0"
@@ -62,3 +62,42 @@ def test_cloning_needs_demonstrations(config):
         worlds_and_model(config.replace(demonstrations=None), "cpu", 1),
     ):
         pass
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"normalize": True, "policy": OFFSET_POLICY},
+            "normalize is True, should be false with clo",
+        ),
+        ({"ent_coef": 0.1}, r"ent_coef is 0.1, but has no effect with cloning_steps"),
+    ],
+)
+def test_settings_that_cloning_contradicts_raise(config, values, message):
+    with pytest.raises(UsageError, match=message):
+        config.replace(**values)
+
+
+def test_the_critic_learns_the_return_and_the_actor_climbs_it(config):
+    config = config.replace(gamma=0.5, tau=0.05, learning_rate=1e-3, cloning_weight=0.0)
+    with worlds_and_model(config, "cpu", 1) as (worlds, model):
+        model.learn(64)  # to set up the logger; clones
+        buffer, observation = model.replay_buffer, worlds.reset()
+        buffer.reset()
+        draw = np.random.default_rng(0)
+        for _ in range(200):  # each step ends its episode, and pays for the first component
+            action = draw.uniform(-1, 1, (8, 3)).astype(np.float32)
+            done, infos = np.ones(8, dtype=bool), [{} for _ in range(8)]
+            buffer.add(observation, observation, action, action[:, 0], done, infos)
+        buffer.fraction = 0.0
+        seen = {key: torch.as_tensor(values) for key, values in observation.items()}
+        with torch.no_grad():
+            before = model.actor(seen, deterministic=True)[:, 0].mean()
+        losses = [model._update(64)[0] for _ in range(600)]
+        with torch.no_grad():
+            after = model.actor(seen, deterministic=True)[:, 0].mean()
+            value = model.critic(seen, torch.full((8, 3), 0.5))[0].mean()
+    assert np.mean(losses[-20:]) < 0.1 * np.mean(losses[:20])
+    assert value == pytest.approx(0.5, abs=0.15)
+    assert after > max(0.8, before)
