@@ -44,7 +44,7 @@ machine they give the same policy, otherwise a similar one.
 | in environments | fraction of the wall time spent in the steps of the environments |
 | success at the end | fraction of episodes whose goal is reached at the end |
 | at any time | fraction of episodes whose goal is reached after any step |
-| commit | git commit of the training code |
+| commit | git commit of the training code; -dirty: with changes that were not committed |
 
 Intervals in parentheses are 95 % confidence intervals (Wilson). ± is the standard deviation over
 seeds.
