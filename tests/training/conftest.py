@@ -4,7 +4,7 @@ import gymnasium as gym
 import pytest
 
 from tests.training.reach import ReachEnv, ReachVectorEnv
-from training.settings.config import PPOConfig, SACConfig
+from training.settings.algorithms import PPOConfig, SACConfig
 
 REACH = "Test/Reach-v0"
 

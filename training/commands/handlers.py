@@ -255,7 +255,7 @@ def tune(options: argparse.Namespace) -> int:
     config = config_of(options)
 
     from training.commands import tuning
-    from training.settings.config import SACConfig
+    from training.settings.algorithms import SACConfig
     from training.settings.config_file import parse_settings
 
     # the steps of the flag, or a fraction of those of the settings; no fine-tuning stage

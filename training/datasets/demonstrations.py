@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from training.datasets.record import Recorded
-from training.settings.config import SACConfig
+from training.settings.algorithms import SACConfig
 from training.settings.environment_ids import plain_id
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError

@@ -10,7 +10,7 @@ import numpy as np
 from training.policies.policy import SCRIPTED, Policy
 from training.policies.policy_file import SUFFIX, read_policy
 from training.runs.run_folder import RunFolder
-from training.settings.config import ALGORITHMS
+from training.settings.algorithms import ALGORITHMS
 from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
 from training.settings.environments import registered_arguments

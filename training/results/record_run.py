@@ -16,7 +16,8 @@ from training.results.plot import read_learning_curve
 from training.results.result import RESULT, Result, parse_result, read_results, task_name
 from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
-from training.settings.config import SACConfig, TrainConfig
+from training.settings.algorithms import SACConfig
+from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 

@@ -11,7 +11,7 @@ from training.results.result import Result, read_results
 from training.results.results_page import by_kind, image_paths, write_pages
 from training.results.video import record
 from training.runs.run_folder import RunFolder
-from training.settings.config import ALGORITHMS
+from training.settings.algorithms import ALGORITHMS
 from training.settings.errors import UsageError, check_exists
 
 SOURCE = Path(__file__).resolve().parents[2]

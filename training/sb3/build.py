@@ -19,14 +19,14 @@ from training.policies.symlog import SymlogPolicy
 from training.sb3.cloning import CloningSAC
 from training.sb3.demonstration_buffers import DemonstrationBuffer, DemonstrationHerBuffer
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import (
+from training.settings.algorithms import (
     BOUNDED_POLICY,
     OFFSET_POLICY,
     SYMLOG_POLICY,
     PPOConfig,
     SACConfig,
-    TrainConfig,
 )
+from training.settings.config import TrainConfig
 from training.settings.environments import make_training_env
 from training.settings.errors import UsageError
 

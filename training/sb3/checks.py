@@ -14,7 +14,8 @@ from training.runs.run_folder import RunFolder
 from training.sb3.build import worlds_and_model
 from training.sb3.model_state import read_state
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import SACConfig, TrainConfig
+from training.settings.algorithms import SACConfig
+from training.settings.config import TrainConfig
 from training.settings.environments import make_training_env
 from training.settings.errors import UsageError
 

@@ -25,7 +25,8 @@ from training.sb3.model_state import restore
 from training.sb3.progress import StopAtSuccess, TrainingProgress, success_rate
 from training.sb3.rollout_threads import OneThreadRollouts
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import PPOConfig, SACConfig, TrainConfig
+from training.settings.algorithms import PPOConfig, SACConfig
+from training.settings.config import TrainConfig
 from training.settings.environments import make_training_env, make_vector_env
 from training.settings.errors import UsageError
 

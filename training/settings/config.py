@@ -16,25 +16,17 @@ from training.settings.settings import (
     InvalidValue,
     boolean,
     choice,
-    entropy_coefficient,
     index_pairs,
     integer,
     layer_widths,
     mapping,
     number,
     optional,
-    parse_wrappers,
     schedule,
     setting,
-    text,
     wrapper_list,
 )
 
-BOUNDED_POLICY = "training.policies.bounded.BoundedPolicy"
-OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
-SYMLOG_POLICY = "training.policies.symlog.SymlogPolicy"
-SAC_POLICIES = (OFFSET_POLICY, SYMLOG_POLICY)
-"""Import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3."""
 WRAPPERS = (
     "rigid_envs.wrappers.ActionPenalty",
     "rigid_envs.wrappers.BoundReward",
@@ -55,10 +47,6 @@ NETWORK_RULES = {
     "log_std_init": number(),
     "min_std": number(at_least=0),
     "differences": index_pairs,
-}
-HER_RULES = {
-    "n_sampled_goal": integer(1),
-    "goal_selection_strategy": choice("future", "final", "episode"),
 }
 
 
@@ -196,138 +184,3 @@ class TrainConfig:
                 f"{where}: finetune_timesteps is {self.finetune_timesteps}, should be less than "
                 f"n_timesteps = {self.n_timesteps}"
             )
-
-
-@dataclass(frozen=True, kw_only=True)
-class PPOConfig(TrainConfig):
-    """Settings of proximal policy optimisation (PPO)."""
-
-    algo: ClassVar[str] = "ppo"
-
-    policy: str = setting(choice("MultiInputPolicy", BOUNDED_POLICY), "MultiInputPolicy")
-    """Policy class; training.policies.bounded.BoundedPolicy keeps the mean action within ±1."""
-    n_steps: int = setting(integer(1), 2048)
-    """Steps of each world between two updates."""
-    n_epochs: int = setting(integer(1), 10)
-    """Passes over the collected steps in an update."""
-    gae_lambda: float = setting(number(at_least=0, at_most=1), 0.95)
-    """Bias-variance trade-off of the advantage estimate."""
-    ent_coef: float = setting(number(at_least=0), 0.0)
-    """Weight of the entropy bonus."""
-    vf_coef: float = setting(number(at_least=0), 0.5)
-    """Weight of the value loss."""
-    max_grad_norm: float = setting(number(above=0), 0.5)
-    """Largest norm of a gradient; larger gradients are scaled down to it."""
-    clip_range: float | str = setting(schedule(), 0.2)
-    """Clip range of the ratio of action probabilities."""
-    target_kl: float | None = setting(optional(number(above=0)), None)
-    """End an update at this KL divergence from the policy before it; null for no limit."""
-
-    def _check_combinations(self, where: str) -> None:
-        super()._check_combinations(where)
-        if "min_std" in self.policy_kwargs and self.policy != BOUNDED_POLICY:
-            raise UsageError(f"{where}: policy_kwargs: min_std requires policy: {BOUNDED_POLICY}")
-        rollout = self.n_envs * self.n_steps
-        first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
-        if self.finetune_timesteps and first_stage >= self.n_timesteps:
-            raise UsageError(
-                f"{where}: finetune_timesteps is {self.finetune_timesteps}, less than the last "
-                f"rollout; it should be at least n_envs × n_steps = {rollout}"
-            )
-        if self.batch_size > rollout:
-            raise UsageError(
-                f"{where}: batch_size is {self.batch_size}, should be at most "
-                f"n_envs × n_steps = {rollout}"
-            )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SACConfig(TrainConfig):
-    """Settings of soft actor-critic (SAC), optionally with hindsight experience replay (HER)."""
-
-    algo: ClassVar[str] = "sac"
-
-    policy: str = setting(choice("MultiInputPolicy", *SAC_POLICIES), "MultiInputPolicy")
-    """Policy class; training.policies.offsets.OffsetPolicy observes the goal relative to the
-    achieved one, training.policies.symlog.SymlogPolicy also on a logarithmic scale."""
-    buffer_size: int = setting(integer(1), 1_000_000)
-    """Capacity of the replay buffer in transitions, summed over the worlds."""
-    learning_starts: int = setting(integer(0), 1000)
-    """Steps of random actions before the first update; with HER more than one episode."""
-    train_freq: int = setting(integer(1), 1)
-    """Steps of all worlds between two updates."""
-    gradient_steps: int = setting(integer(-1), 1)
-    """Gradient steps in an update; -1 for as many as transitions were collected."""
-    tau: float = setting(number(above=0, at_most=1), 0.005)
-    """Interpolation factor of the target network's update (Polyak averaging)."""
-    ent_coef: float | str = setting(entropy_coefficient, "auto")
-    """Weight of the entropy bonus; "auto" learns it, "auto_0.1" starts at 0.1."""
-    replay_buffer_class: str | None = setting(optional(choice("HerReplayBuffer")), None)
-    """HerReplayBuffer for hindsight experience replay; null for an ordinary replay buffer."""
-    replay_buffer_kwargs: dict[str, Any] = setting(mapping(HER_RULES), {})
-    """Arguments of HerReplayBuffer: n_sampled_goal, goal_selection_strategy."""
-    demonstrations: str | None = setting(optional(text), None)
-    """Name of a Minari dataset of the environment; null for no demonstrations."""
-    demonstration_fraction: float = setting(number(above=0, at_most=0.9), 0.5)
-    """Part of each batch that is sampled from the demonstrations."""
-    cloning_steps: int = setting(integer(0), 0)
-    """Gradient steps in which the actor only imitates the demonstrations, before the first update.
-    Afterwards it imitates and climbs the critic, without entropy (TD3+BC). 0: SAC."""
-    cloning_weight: float = setting(number(at_least=0), 50.0)
-    """Weight of the squared distance to demonstrated actions, relative to the critic's value."""
-
-    @property
-    def demonstration_batch(self) -> int:
-        """Transitions of a batch that are sampled from the demonstrations."""
-        return round(self.demonstration_fraction * self.batch_size)
-
-    def _check_combinations(self, where: str) -> None:
-        super()._check_combinations(where)
-        if "differences" in self.policy_kwargs and self.policy != SYMLOG_POLICY:
-            raise UsageError(
-                f"{where}: policy_kwargs: differences requires policy: {SYMLOG_POLICY}"
-            )
-        if self.cloning_steps:
-            self._check_cloning(where)
-        if self.normalize and self.policy == SYMLOG_POLICY:
-            raise UsageError(
-                f"{where}: normalize is True, should be false with {SYMLOG_POLICY}, whose units "
-                "are metres"
-            )
-        if self.demonstrations is not None and self.env_wrapper is not None:
-            raise UsageError(
-                f"{where}: env_wrapper cannot be used with demonstrations, whose rewards are those "
-                "of the environment alone"
-            )
-        if self.replay_buffer_class is None:
-            if self.replay_buffer_kwargs:
-                raise UsageError(
-                    f"{where}: replay_buffer_kwargs requires replay_buffer_class: HerReplayBuffer"
-                )
-            return
-        if self.env_kwargs.get("observe_task_guide"):
-            raise UsageError(
-                f"{where}: env_kwargs: observe_task_guide cannot be used with HerReplayBuffer: the "
-                "guide depends on the desired goal, which HerReplayBuffer replaces"
-            )
-        for name, _ in parse_wrappers(self.env_wrapper):
-            if name in ACTION_WRAPPERS:
-                raise UsageError(
-                    f"{where}: env_wrapper: {name} cannot be used with HerReplayBuffer, which "
-                    "computes rewards from goals alone"
-                )
-
-    def _check_cloning(self, where: str) -> None:
-        """Raises UsageError for settings that cloning contradicts."""
-        if self.normalize:
-            raise UsageError(
-                f"{where}: normalize is True, should be false with cloning_steps: the scales would "
-                "change after the actor is fitted"
-            )
-        if self.ent_coef != "auto":
-            raise UsageError(
-                f"{where}: ent_coef is {self.ent_coef}, but has no effect with cloning_steps"
-            )
-
-
-ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}

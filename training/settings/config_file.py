@@ -12,7 +12,8 @@ from typing import Any
 
 import yaml
 
-from training.settings.config import ALGORITHMS, TrainConfig
+from training.settings.algorithms import ALGORITHMS
+from training.settings.config import TrainConfig
 from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
 from training.settings.errors import UsageError, check_exists, nearest

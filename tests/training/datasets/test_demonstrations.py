@@ -15,7 +15,7 @@ from training.policies.policy import scripted_policy  # noqa: E402
 from training.policies.trained_policy import trained_policy  # noqa: E402
 from training.sb3.build import worlds_and_model  # noqa: E402
 from training.sb3.train import resume, train  # noqa: E402
-from training.settings.config import SACConfig  # noqa: E402
+from training.settings.algorithms import SACConfig  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
 
 REACH, NAME = "RigidEnvs/Reach-v0", "reach/scripted-v0"

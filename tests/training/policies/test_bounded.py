@@ -10,7 +10,7 @@ from tests.training.reach import ReachVectorEnv
 from training.policies.bounded import BoundedPolicy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import BOUNDED_POLICY
+from training.settings.algorithms import BOUNDED_POLICY
 from training.settings.errors import UsageError
 
 MIN_STD = 0.2

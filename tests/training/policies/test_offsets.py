@@ -12,7 +12,7 @@ from training.policies.policy_file import load_policy_file
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import OFFSET_POLICY
+from training.settings.algorithms import OFFSET_POLICY
 from training.settings.errors import UsageError
 
 

@@ -30,7 +30,7 @@ from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
 from training.results.results import SOURCE
 from training.sb3.train import train
-from training.settings.config import ALGORITHMS, BOUNDED_POLICY
+from training.settings.algorithms import ALGORITHMS, BOUNDED_POLICY
 from training.settings.config_file import load_config, packaged_environments
 from training.settings.errors import UsageError
 

@@ -12,7 +12,7 @@ from training.policies.symlog import UNITS, SymlogOffsets, SymlogPolicy
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.config import SYMLOG_POLICY
+from training.settings.algorithms import SYMLOG_POLICY
 from training.settings.errors import UsageError
 
 PAIRS = [[1, 0], [0, 1]]

@@ -14,7 +14,7 @@ from training.results.evaluate import evaluate  # noqa: E402
 from training.sb3.build import worlds_and_model  # noqa: E402
 from training.sb3.cloning import NOISE  # noqa: E402
 from training.sb3.train import train  # noqa: E402
-from training.settings.config import OFFSET_POLICY, SYMLOG_POLICY, SACConfig  # noqa: E402
+from training.settings.algorithms import OFFSET_POLICY, SYMLOG_POLICY, SACConfig  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
 
 REACH, NAME = "RigidEnvs/Reach-v0", "reach/noisy-v0"

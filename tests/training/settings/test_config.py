@@ -6,7 +6,7 @@ import gymnasium as gym
 import pytest
 
 import rigid_envs  # noqa: F401  (registers the ids)
-from training.settings.config import ALGORITHMS, PPOConfig
+from training.settings.algorithms import ALGORITHMS, PPOConfig
 from training.settings.config_file import load_config
 from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError, nearest

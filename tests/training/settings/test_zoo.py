@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from training.settings.config import ALGORITHMS
+from training.settings.algorithms import ALGORITHMS
 from training.settings.config_file import CONFIG_FOLDER, load_config, packaged_environments
 
 ROOT = Path(__file__).parents[3]
