@@ -8,10 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+
 from physics.step.threads import default_threads
 
 THREADS = 2  # of every side that uses threads
 ROOT = Path(__file__).resolve().parents[2]
+VECTORS = ("avx512f", "avx2", "avx")  # widest first
 PACKAGES = ("numpy", "numba", "gymnasium", "mujoco")
 
 
@@ -50,6 +53,13 @@ def describe(run: dict[str, Any]) -> str:
 
 
 def _processor() -> str:
+    """Its name, and what decides the width of vectors: its kind, as LLVM names it, and AVX."""
+    features = get_host_cpu_features()
+    widest = next((name for name in VECTORS if features.get(name)), "no AVX")
+    return f"{_processor_name()} ({get_host_cpu_name()}, {widest})"
+
+
+def _processor_name() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
