@@ -37,11 +37,9 @@ def vector_side(task: str, fidelity: str, worlds: int = WORLDS, trained: bool = 
     """
     policy = policy_of(task) if trained else None
     arguments: dict[str, Any] = dict(policy.header.environment.kwargs) if policy else {}
-    arguments |= {"reward_type": "dense", "fidelity": fidelity}
     steps = TASKS[task].max_episode_steps if policy else EPISODE
-    envs = gym.make_vec(
-        id_of(task), num_envs=worlds, threads=THREADS, max_episode_steps=steps, **arguments
-    )
+    arguments |= {"reward_type": "dense", "fidelity": fidelity, "max_episode_steps": steps}
+    envs = gym.make_vec(id_of(task), num_envs=worlds, threads=THREADS, **arguments)
     size = envs.single_action_space.shape or ()
     actions = np.random.default_rng(0).uniform(-1, 1, (steps, worlds, *size)).astype(np.float32)
     observation = envs.reset(seed=0)[0]
