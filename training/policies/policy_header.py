@@ -167,10 +167,10 @@ def _network(value: Any, algorithm: str) -> Network:
         raise InvalidHeader(
             f"network.widths is {network.widths}, should be two or more integers of at least 1"
         )
-    if network.features == "symlog" and (algorithm != "sac" or len(network.widths) < 3):
+    if network.features == "symlog" and len(network.widths) < 3:
         raise InvalidHeader(
             "network.features is 'symlog', should be 'linear': symlog follows the first of at "
-            "least two layers of a sac policy"
+            "least two layers"
         )
     for name, bounds in (("low", network.low), ("high", network.high)):
         if len(bounds) != network.widths[-1]:

@@ -1,4 +1,4 @@
-"""A SAC policy whose features tell millimetres apart near zero and still cover metres."""
+"""Policies whose features tell millimetres apart near zero and still cover metres."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium import spaces
+from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import MultiInputPolicy
 
+from training.policies.bounded import BoundedPolicy
 from training.settings.errors import UsageError
 
 UNITS = (0.1, 0.002)
-"""Each quantity is divided by each of these: a tenth of a metre, and two millimetres."""
+"""By default each quantity is divided by each of these: a tenth of a metre, and two millimetres."""
 
 
 def symlog(x: torch.Tensor) -> torch.Tensor:
@@ -21,9 +23,9 @@ def symlog(x: torch.Tensor) -> torch.Tensor:
 
 
 class SymlogOffsets(BaseFeaturesExtractor):
-    """Features: symlog(x / unit) of each x and each of `UNITS`.
+    """Features: symlog(x / unit) of each x and each unit.
 
-    x are the components of the observation, of desired minus achieved goal, and of the given
+    x are components of the observation, those of desired minus achieved goal, and the given
     differences. A cube is released within 4 mm of its place but carried from tenths of a
     metre away; a network of few units cannot resolve both in one linear scale. Symlog is that of
     Hafner et al., Mastering diverse domains through world models (2023).
@@ -34,6 +36,8 @@ class SymlogOffsets(BaseFeaturesExtractor):
         space: Observation space of a goal environment.
         differences: Pairs [a, b] of components of `observation`, whose difference a - b is an x
             too.
+        components: Components of `observation` that are x, -1 being the last; None for all.
+        units: What each x is divided by, in the unit of x.
 
     Raises:
         UsageError: The space has no goals, or the observation has no such component.
@@ -41,53 +45,81 @@ class SymlogOffsets(BaseFeaturesExtractor):
 
     matrix: torch.Tensor
 
-    def __init__(self, space: spaces.Dict, differences: Sequence[Sequence[int]] = ()):
+    def __init__(
+        self,
+        space: spaces.Dict,
+        differences: Sequence[Sequence[int]] = (),
+        components: Sequence[int] | None = None,
+        units: Sequence[float] = UNITS,
+    ):
         sizes = {key: int(np.prod(one.shape or ())) for key, one in space.spaces.items()}
         if set(sizes) != {"observation", "achieved_goal", "desired_goal"}:
             raise UsageError(f"SymlogPolicy requires observations with goals, not {space}")
-        observed, goal = sizes["observation"], sizes["desired_goal"]
-        if any(not 0 <= index < observed for pair in differences for index in pair):
+        last, goal = sizes["observation"] - 1, sizes["desired_goal"]
+        if any(not 0 <= index <= last for pair in differences for index in pair):
             raise UsageError(
                 f"differences is {differences}, should have pairs of components of the "
-                f"observation, 0 to {observed - 1}"
+                f"observation, 0 to {last}"
             )
+        if any(not -last - 1 <= index <= last for index in components or ()):
+            raise UsageError(
+                f"components is {components}, should have components of the observation, "
+                f"{-last - 1} to {last}"
+            )
+        chosen = np.arange(last + 1)[slice(None) if components is None else list(components)]
+        observed = len(chosen)
         rows = observed + goal + len(differences)
-        super().__init__(space, rows * len(UNITS))
+        super().__init__(space, rows * len(units))
         self.keys = list(sizes)
         ends = np.cumsum(list(sizes.values()))
         first = dict(zip(sizes, ends - list(sizes.values()), strict=True))
         x = torch.zeros(rows, int(ends[-1]))
-        for row in range(observed):
-            x[row, first["observation"] + row] = 1.0
+        for row, component in enumerate(chosen.tolist()):
+            x[row, first["observation"] + component] = 1.0
         for row in range(goal):
             x[observed + row, first["desired_goal"] + row] = 1.0
             x[observed + row, first["achieved_goal"] + row] = -1.0
         for row, (a, b) in enumerate(differences, start=observed + goal):
             x[row, first["observation"] + a] = 1.0
             x[row, first["observation"] + b] = -1.0
-        self.register_buffer("matrix", torch.cat([x / unit for unit in UNITS]))
+        self.register_buffer("matrix", torch.cat([x / unit for unit in units]))
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
-        """Features [n, len(UNITS) (observation + goal + differences)]."""
+        """Features [n, len(units) (components + goal + differences)]."""
         parts = [observations[key].flatten(start_dim=1) for key in self.keys]
         return symlog(torch.cat(parts, dim=1) @ self.matrix.T)
 
 
-class SymlogPolicy(MultiInputPolicy):
-    """Stable-Baselines3's SAC policy for goal environments, with `SymlogOffsets` as its features.
+class Symlog:
+    """Gives a policy of Stable-Baselines3 `SymlogOffsets` as its features.
 
     Args:
-        *args: As for Stable-Baselines3's policy.
-        differences: As for `SymlogOffsets`.
-        **kwargs: As for Stable-Baselines3's policy.
+        *args: As for the policy.
+        differences, components, units: As for `SymlogOffsets`.
+        **kwargs: As for the policy.
     """
 
-    def __init__(self, *args: Any, differences: Sequence[Sequence[int]] = (), **kwargs: Any):
-        super().__init__(
-            *args,
-            **{
-                **kwargs,
-                "features_extractor_class": SymlogOffsets,
-                "features_extractor_kwargs": {"differences": differences},
-            },
-        )
+    def __init__(
+        self,
+        *args: Any,
+        differences: Sequence[Sequence[int]] = (),
+        components: Sequence[int] | None = None,
+        units: Sequence[float] = UNITS,
+        **kwargs: Any,
+    ):
+        features = {"differences": differences, "components": components, "units": units}
+        kwargs["features_extractor_class"] = SymlogOffsets
+        kwargs["features_extractor_kwargs"] = features  # Stable-Baselines3 saves them too
+        super().__init__(*args, **kwargs)
+
+
+class SymlogPolicy(Symlog, MultiInputPolicy):
+    """Stable-Baselines3's SAC policy with `SymlogOffsets` as its features."""
+
+
+class SymlogActorCriticPolicy(Symlog, MultiInputActorCriticPolicy):
+    """Stable-Baselines3's PPO policy with `SymlogOffsets` as its features."""
+
+
+class BoundedSymlogPolicy(Symlog, BoundedPolicy):
+    """`BoundedPolicy` for PPO, with `SymlogOffsets` as its features."""

@@ -15,14 +15,20 @@ from stable_baselines3.her import HerReplayBuffer
 from training.datasets.demonstrations import read_demonstrations
 from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import OffsetPolicy
-from training.policies.symlog import SymlogPolicy
+from training.policies.symlog import (
+    BoundedSymlogPolicy,
+    SymlogActorCriticPolicy,
+    SymlogPolicy,
+)
 from training.sb3.cloning import CloningSAC
 from training.sb3.demonstration_buffers import DemonstrationBuffer, DemonstrationHerBuffer
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.algorithms import (
     BOUNDED_POLICY,
+    BOUNDED_SYMLOG_POLICY,
     OFFSET_POLICY,
     SYMLOG_POLICY,
+    SYMLOG_PPO_POLICY,
     PPOConfig,
     SACConfig,
 )
@@ -36,6 +42,8 @@ POLICIES: dict[str, type[BasePolicy]] = {
     BOUNDED_POLICY: BoundedPolicy,
     OFFSET_POLICY: OffsetPolicy,
     SYMLOG_POLICY: SymlogPolicy,
+    SYMLOG_PPO_POLICY: SymlogActorCriticPolicy,
+    BOUNDED_SYMLOG_POLICY: BoundedSymlogPolicy,
 }
 ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
 
@@ -77,10 +85,15 @@ def worlds_and_model(
 
 def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
     monitored = VecMonitor(worlds)
-    if not config.normalize:
+    if not (config.norm_obs or config.norm_reward):
         return monitored
     if config.algo == "ppo":
-        return VecNormalize(monitored, gamma=config.gamma)
+        return VecNormalize(
+            monitored,
+            norm_obs=config.norm_obs,
+            norm_reward=config.norm_reward,
+            gamma=config.gamma,
+        )
     # SAC: rewards are not scaled, because old transitions would get the statistics of the time at
     # which they are sampled. Goals are not scaled, because achieved and desired goals with
     # different scales could not be compared.

@@ -151,6 +151,8 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
 def _statistics(env: VecNormalize | None) -> dict[str, Any]:
     if env is None:
         return {}
+    if not env.norm_obs:
+        return {RETURN: env.ret_rms}
     assert isinstance(env.obs_rms, dict)
     observations = {f"observation/{key}": one for key, one in env.obs_rms.items()}
     return {RETURN: env.ret_rms, **observations}

@@ -21,6 +21,11 @@ from training.settings.settings import (
 BOUNDED_POLICY = "training.policies.bounded.BoundedPolicy"
 OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
 SYMLOG_POLICY = "training.policies.symlog.SymlogPolicy"
+SYMLOG_PPO_POLICY = "training.policies.symlog.SymlogActorCriticPolicy"
+BOUNDED_SYMLOG_POLICY = "training.policies.symlog.BoundedSymlogPolicy"
+PPO_POLICIES = (BOUNDED_POLICY, SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
+MIN_STD_POLICIES = (BOUNDED_POLICY, BOUNDED_SYMLOG_POLICY)
+SYMLOG_POLICIES = (SYMLOG_POLICY, SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
 SAC_POLICIES = (OFFSET_POLICY, SYMLOG_POLICY)
 """Import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3."""
 HER_RULES = {
@@ -35,8 +40,10 @@ class PPOConfig(TrainConfig):
 
     algo: ClassVar[str] = "ppo"
 
-    policy: str = setting(choice("MultiInputPolicy", BOUNDED_POLICY), "MultiInputPolicy")
-    """Policy class; training.policies.bounded.BoundedPolicy keeps the mean action within ±1."""
+    policy: str = setting(choice("MultiInputPolicy", *PPO_POLICIES), "MultiInputPolicy")
+    """Policy class; training.policies.bounded.BoundedPolicy keeps the mean action within ±1,
+    training.policies.symlog.SymlogActorCriticPolicy observes on a logarithmic scale,
+    training.policies.symlog.BoundedSymlogPolicy does both."""
     n_steps: int = setting(integer(1), 2048)
     """Steps of each world between two updates."""
     n_epochs: int = setting(integer(1), 10)
@@ -56,8 +63,11 @@ class PPOConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        if "min_std" in self.policy_kwargs and self.policy != BOUNDED_POLICY:
-            raise UsageError(f"{where}: policy_kwargs: min_std requires policy: {BOUNDED_POLICY}")
+        if "min_std" in self.policy_kwargs and self.policy not in MIN_STD_POLICIES:
+            raise UsageError(
+                f"{where}: policy_kwargs: min_std requires policy: {' or '.join(MIN_STD_POLICIES)}"
+            )
+        _check_symlog(self, where)
         rollout = self.n_envs * self.n_steps
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:
@@ -114,17 +124,14 @@ class SACConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        if "differences" in self.policy_kwargs and self.policy != SYMLOG_POLICY:
+        _check_symlog(self, where)
+        if isinstance(self.normalize, dict):
             raise UsageError(
-                f"{where}: policy_kwargs: differences requires policy: {SYMLOG_POLICY}"
+                f"{where}: normalize is {self.normalize}, should be true or false: SAC's rewards "
+                "are never scaled"
             )
         if self.cloning_steps:
             self._check_cloning(where)
-        if self.normalize and self.policy == SYMLOG_POLICY:
-            raise UsageError(
-                f"{where}: normalize is True, should be false with {SYMLOG_POLICY}, whose units "
-                "are metres"
-            )
         if self.demonstrations is not None and self.env_wrapper is not None:
             raise UsageError(
                 f"{where}: env_wrapper cannot be used with demonstrations, whose rewards are those "
@@ -159,6 +166,22 @@ class SACConfig(TrainConfig):
             raise UsageError(
                 f"{where}: ent_coef is {self.ent_coef}, but has no effect with cloning_steps"
             )
+
+
+def _check_symlog(config: TrainConfig, where: str) -> None:
+    """Raises UsageError for settings of symlog policies that contradict the others."""
+    symlog = config.policy in SYMLOG_POLICIES
+    for name in ("differences", "components", "units"):
+        if name in config.policy_kwargs and not symlog:
+            raise UsageError(
+                f"{where}: policy_kwargs: {name} requires policy: {' or '.join(SYMLOG_POLICIES)}"
+            )
+    if config.norm_obs and symlog:
+        only_rewards = " or {norm_obs: false}" if config.algo == "ppo" else ""
+        raise UsageError(
+            f"{where}: normalize is {config.normalize}, should be false{only_rewards} with "
+            f"{config.policy}, whose units are metres"
+        )
 
 
 ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}

@@ -17,13 +17,16 @@ from training.settings.settings import (
     boolean,
     choice,
     index_pairs,
+    indices,
     integer,
     layer_widths,
     mapping,
     number,
     optional,
+    positive_numbers,
     schedule,
     setting,
+    true_false_or,
     wrapper_list,
 )
 
@@ -47,7 +50,12 @@ NETWORK_RULES = {
     "log_std_init": number(),
     "min_std": number(at_least=0),
     "differences": index_pairs,
+    "components": indices,
+    "units": positive_numbers,
 }
+
+NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
+"""Arguments of VecNormalize that say what is scaled, both true by default."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +82,9 @@ class TrainConfig:
     finetune_env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments that replace those of `env_kwargs` in the fine-tuning stage, such as a higher
     fidelity. The policy is evaluated with them."""
-    normalize: bool = setting(boolean, False)
-    """Scale observations and rewards by their running mean and deviation (VecNormalize)."""
+    normalize: bool | dict[str, bool] = setting(true_false_or(NORMALIZE_RULES), False)
+    """Scale observations and rewards by their running mean and deviation (VecNormalize);
+    {norm_obs: false} scales only rewards, {norm_reward: false} only observations."""
     eval_env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments that replace those of training when the policy is evaluated, such as the length of
     episodes."""
@@ -93,8 +102,8 @@ class TrainConfig:
     """Policy class of Stable-Baselines3 for dict observations."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
-    relu for SAC, as in Stable-Baselines3), min_std (BoundedPolicy only), differences (SymlogPolicy
-    only)."""
+    relu for SAC, as in Stable-Baselines3), min_std (bounded policies only), differences,
+    components and units (symlog policies only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -137,6 +146,20 @@ class TrainConfig:
     def replace(self, source: str = "command line", **values: Any) -> Self:
         """A copy with other `values`, validated like those of a file."""
         return self.from_mapping(self.env_id, {**self.as_mapping(), **values}, source)
+
+    @property
+    def norm_obs(self) -> bool:
+        """Whether observations are scaled."""
+        return self._scales("norm_obs")
+
+    @property
+    def norm_reward(self) -> bool:
+        """Whether rewards are scaled."""
+        return self._scales("norm_reward")
+
+    def _scales(self, name: str) -> bool:
+        chosen = self.normalize
+        return chosen if isinstance(chosen, bool) else chosen.get(name, True)
 
     @property
     def last_stage_kwargs(self) -> dict[str, Any]:

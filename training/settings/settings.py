@@ -134,6 +134,34 @@ def layer_widths(value: Any) -> list[int]:
         raise InvalidValue("a list of layer widths, as in [64, 64]") from None
 
 
+def positive_numbers(value: Any) -> list[float]:
+    """Numbers above 0, as in [0.1, 0.01]."""
+    try:
+        return [number(above=0)(entry) for entry in _check_type(list, value)]
+    except InvalidValue:
+        raise InvalidValue("a list of numbers above 0, as in [0.1, 0.01]") from None
+
+
+def true_false_or(keys: Mapping[str, Rule]) -> Rule:
+    """true, false, or a mapping with these keys."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, bool):
+            return value
+        if isinstance(value, dict):
+            return mapping(keys)(value)
+        raise InvalidValue(f"true, false, or a mapping of {', '.join(keys)}")
+
+    return check
+
+
+def indices(value: Any) -> list[int]:
+    """Indices, as in [0, 1, -1]; those below 0 count from the end."""
+    if not isinstance(value, list) or any(type(index) is not int for index in value):
+        raise InvalidValue("a list of indices, as in [0, 1, -1]")
+    return value
+
+
 def index_pairs(value: Any) -> list[list[int]]:
     """Pairs of indices, as in [[8, 0], [9, 1]]."""
     try:

@@ -45,7 +45,7 @@ def observations(count: int = 200, scale: float = 2.0) -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory) -> Path:
     """A policy file of PPO with observation statistics."""
-    config = load_config("ppo", "RigidEnvs/Push-v0").as_mapping() | {
+    config = load_config("ppo", "RigidEnvs/Reach-v0").as_mapping() | {
         "n_envs": 8,
         "n_timesteps": 160,
         "n_steps": 10,
@@ -232,7 +232,10 @@ def test_arbitrary_header_raises_or_acts(saved, tmp_path, field, value):
     [
         ({"algorithm": "td4"}, "algorithm is 'td4', should be ppo or sac"),
         ({"network__activation": "gelu"}, "'gelu', should be tanh or relu or elu"),
-        ({"network__features": "symlog"}, "features is 'symlog', should be 'linear'"),
+        (
+            {"network__features": "symlog", "network__widths": [6, 2]},
+            "features is 'symlog', should be 'linear'",
+        ),
         ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         (

@@ -4,15 +4,21 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
-from stable_baselines3 import SAC
+from stable_baselines3 import PPO, SAC
 
 from tests.training.reach import ReachVectorEnv
 from training.policies.policy_file import load_policy_file
-from training.policies.symlog import UNITS, SymlogOffsets, SymlogPolicy
+from training.policies.symlog import (
+    UNITS,
+    BoundedSymlogPolicy,
+    SymlogActorCriticPolicy,
+    SymlogOffsets,
+    SymlogPolicy,
+)
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.algorithms import SYMLOG_POLICY
+from training.settings.algorithms import SYMLOG_POLICIES, SYMLOG_POLICY, SYMLOG_PPO_POLICY
 from training.settings.errors import UsageError
 
 PAIRS = [[1, 0], [0, 1]]
@@ -21,31 +27,52 @@ PAIRS = [[1, 0], [0, 1]]
 def test_features_are_logarithms_of_observation_goal_offset_and_differences():
     env = RigidVecEnv(ReachVectorEnv(4))
     found = env.reset()
-    extractor = SymlogOffsets(env.observation_space, PAIRS)
-    features = extractor({key: torch.as_tensor(value) for key, value in found.items()})
+    tensors = {key: torch.as_tensor(value) for key, value in found.items()}
+    for components in (None, [1], [0, -1], []):
+        for units in (UNITS, (0.5,)):
+            extractor = SymlogOffsets(env.observation_space, PAIRS, components, units)
+            features = extractor(tensors)
+            check(found, features, components, units)
+            assert features.shape[1] == extractor.features_dim
+
+
+def check(found, features, components, units):
     seen = found["observation"]
     difference = seen[:, [1]] - seen[:, [0]]
     offset = found["desired_goal"] - found["achieved_goal"]
-    x = np.concatenate([seen, offset, difference, -difference], axis=1)
-    expected = [np.sign(x) * np.log(1.0 + np.abs(x) / unit) for unit in UNITS]
+    chosen = seen if components is None else seen[:, components]
+    x = np.concatenate([chosen, offset, difference, -difference], axis=1)
+    expected = [np.sign(x) * np.log(1.0 + np.abs(x) / unit) for unit in units]
     np.testing.assert_allclose(features, np.concatenate(expected, axis=1), rtol=1e-4, atol=1e-5)
-    assert features.shape[1] == extractor.features_dim
 
 
-def test_a_saved_policy_keeps_its_features(tmp_path):
-    kwargs = {"differences": PAIRS}
-    model = SAC(SymlogPolicy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
-    assert not list(model.actor.features_extractor.parameters())
+@pytest.mark.parametrize(
+    ("algorithm", "policy"),
+    [(SAC, SymlogPolicy), (PPO, SymlogActorCriticPolicy), (PPO, BoundedSymlogPolicy)],
+)
+def test_a_saved_policy_keeps_its_features(tmp_path, algorithm, policy):
+    kwargs = {"differences": PAIRS, "components": [1], "units": [0.1]}
+    model = algorithm(policy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
+    matrices = matrices_of(model)
     model.save(tmp_path / "model.zip")
-    loaded = SAC.load(tmp_path / "model.zip")
-    for one in (loaded.actor, loaded.critic):
-        kept = one.features_extractor
-        assert torch.equal(kept.matrix, model.actor.features_extractor.matrix)
+    kept = matrices_of(algorithm.load(tmp_path / "model.zip"))
+    for one in (*matrices, *kept):
+        assert torch.equal(one, matrices[0])
 
 
-def test_policy_file_acts_as_the_policy(quick_sac, tmp_path):
-    kwargs = {**quick_sac.policy_kwargs, "differences": PAIRS}
-    config = quick_sac.replace(policy=SYMLOG_POLICY, policy_kwargs=kwargs)
+def matrices_of(model):
+    found = [one for one in model.policy.modules() if isinstance(one, SymlogOffsets)]
+    assert found
+    assert not any(list(one.parameters()) for one in found)
+    return [one.matrix for one in found]
+
+
+@pytest.mark.parametrize("policy", SYMLOG_POLICIES)
+def test_policy_file_acts_as_the_policy(quick_sac, quick_ppo, tmp_path, policy):
+    quick = quick_sac if policy == SYMLOG_POLICY else quick_ppo
+    kwargs = {**quick.policy_kwargs, "differences": PAIRS, "components": [1], "units": [0.1]}
+    normalize = {"norm_obs": False} if quick is quick_ppo else False
+    config = quick.replace(policy=policy, policy_kwargs=kwargs, normalize=normalize)
     folder = train(config, tmp_path, quiet=True).folder
     content = load_policy_file(folder.policy)
     env = RigidVecEnv(ReachVectorEnv(50))
@@ -63,12 +90,25 @@ def test_wrong_spaces_components_and_algorithms_raise(quick_ppo, quick_sac):
         SymlogOffsets(spaces.Dict({"observation": box}))
     with pytest.raises(UsageError, match=r"differences is \[\[0, 3\]\], should .* 0 to 2"):
         SymlogOffsets(goals, [[0, 3]])
+    with pytest.raises(UsageError, match=r"components is \[3\], should have .* -3 to 2"):
+        SymlogOffsets(goals, components=[3])
     with pytest.raises(UsageError, match=r"policy is 'training.policies.symlog.SymlogPolicy'"):
         quick_ppo.replace(policy=SYMLOG_POLICY)
     with pytest.raises(UsageError, match=r"differences requires policy: training.policies.symlog"):
         quick_sac.replace(policy_kwargs={"differences": PAIRS})
-    with pytest.raises(UsageError, match=r"normalize is True, should be false with training.poli"):
-        quick_sac.replace(policy=SYMLOG_POLICY, normalize=True)
+    with pytest.raises(UsageError, match=r"components requires policy: training.policies.symlog"):
+        quick_ppo.replace(policy_kwargs={"components": [1]})
+    with pytest.raises(
+        UsageError, match=r"in which components is a list of indices, as in \[0, 1, -1\]"
+    ):
+        quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"components": [0.5]})
+    with pytest.raises(UsageError, match=r"in which units is a list of numbers above 0"):
+        quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"units": [0.1, 0]})
+    with pytest.raises(UsageError, match=r"normalize is \{'norm_obs': False\}, should be true or"):
+        quick_sac.replace(normalize={"norm_obs": False})
+    for quick, policy in ((quick_sac, SYMLOG_POLICY), (quick_ppo, SYMLOG_PPO_POLICY)):
+        with pytest.raises(UsageError, match=r"normalize is True, .* with training."):
+            quick.replace(policy=policy, normalize=True)
     for wrong in ([[1]], [[1, -1]], [1, 2], "8-0"):
         with pytest.raises(UsageError, match=r"a list of pairs of indices, as in \[\[8, 0\]"):
             quick_sac.replace(policy=SYMLOG_POLICY, policy_kwargs={"differences": wrong})

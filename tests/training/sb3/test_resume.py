@@ -86,7 +86,7 @@ def interrupted(config, tmp_path, monkeypatch, after, error=KeyboardInterrupt) -
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
-@pytest.mark.parametrize("normalize", [False, True])
+@pytest.mark.parametrize("normalize", [False, True, {"norm_obs": False}])
 def test_ppo_resumes_and_trains_for_the_remaining_steps(
     quick_ppo, tmp_path, monkeypatch, error, normalize
 ):

@@ -42,7 +42,10 @@ for env_id in env_ids:
     if "replay_buffer_class" in settings:
         settings["replay_buffer_class"] = settings["replay_buffer_class"].__name__
     settings |= {"n_envs": manager.n_envs, "n_timesteps": manager.n_timesteps}
-    settings |= {"env_kwargs": manager.env_kwargs, "normalize": bool(manager.normalize)}
+    settings |= {"env_kwargs": manager.env_kwargs, "normalize": manager.normalize}
+    chosen = {key: one for key, one in manager.normalize_kwargs.items() if key != "gamma"}
+    if manager.normalize and chosen:
+        settings["normalize"] = chosen
     found[env_id] = {"settings": settings, "gamma": model.gamma, "net_arch": model.policy.net_arch}
     found[env_id]["env_wrapper"] = manager.env_wrapper is not None
 print()
