@@ -1,6 +1,6 @@
 """Pictures of the tasks: frames of an episode in a row, and an animation of all tasks.
 
-Trained policies of results/ play; the scripted controllers build the tower of three and push the T.
+Trained policies of results/ play; the scripted controller builds the tower of three.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,7 +40,7 @@ class Strip(NamedTuple):
 
 STRIPS = {
     "push": Strip("Push", 1_000_008, (0, 6, 12, 20), {}),
-    "pusht": Strip("PushT", 1_000_000, (0, 12, 30, 60), {"fidelity": "balanced"}),
+    "pusht": Strip("PushT", 1_000_000, (0, 12, 30, 60), {}),
     "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),
     "slide": Strip("Slide", 1_000_000, (0, 5, 12, 30), {}),
     "stack": Strip("Stack", 1_000_000, (0, 14, 60, 140), {"blocks": 3}),
@@ -53,7 +53,6 @@ FILM = (
     {"Push": 16, "Stack": 48, "Throw": 24},
     {"PushT": 48, "Reach": 12, "Slide": 32},
 )
-FILM_ARGUMENTS: dict[str, dict[str, Any]] = {"PushT": {"fidelity": "balanced"}}
 FILM_LENGTH = 96
 FILM_SIZE, FILM_FPS, FILM_COLOURS = 260, 25.0, 128
 
@@ -88,11 +87,10 @@ def draw_film(path: Path) -> None:
 
 def _film(task: str, steps: int) -> list[Array]:
     """FILM_LENGTH frames: `steps` of each of several episodes."""
-    arguments = FILM_ARGUMENTS.get(task, {})
     return [
         frame
         for k in range(FILM_LENGTH // steps)
-        for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE, **arguments))[1:]
+        for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1:]
     ]
 
 
