@@ -12,7 +12,6 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -41,21 +40,14 @@ def _id(task: str) -> str:
 
 
 def config_at(task: str, preset: str) -> TrainConfig:
-    """The settings of a task, all stages at one preset."""
+    """The settings of a task, at one preset."""
     config = load_config("ppo", _id(task))
-    changes: dict[str, Any] = {"env_kwargs": {**config.env_kwargs, "fidelity": preset}}
-    if config.finetune_env_kwargs:
-        changes["finetune_env_kwargs"] = {**config.finetune_env_kwargs, "fidelity": preset}
-    return config.replace(**changes)
+    return config.replace(env_kwargs={**config.env_kwargs, "fidelity": preset})
 
 
 def finished_at(task: str, first: str, last: str) -> TrainConfig:
     """Training at one preset that ends with a stage at another one."""
     config = config_at(task, first)
-    if config.finetune_timesteps:
-        return config.replace(
-            finetune_env_kwargs={**config.finetune_env_kwargs, "fidelity": last}
-        )  # fmt: skip
     steps = int(LAST_STAGE * config.n_timesteps)
     return config.replace(finetune_timesteps=steps, finetune_env_kwargs={"fidelity": last})
 

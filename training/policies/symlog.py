@@ -11,6 +11,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import MultiInputPolicy
 
 from training.policies.bounded import BoundedPolicy
+from training.settings.config import SYMLOG_RULES
 from training.settings.errors import UsageError
 
 UNITS = (0.1, 0.002)
@@ -35,7 +36,7 @@ class SymlogOffsets(BaseFeaturesExtractor):
     Args:
         space: Observation space of a goal environment.
         differences: Pairs [a, b] of components of `observation`, whose difference a - b is an x
-            too.
+            too; -1 is the last component.
         components: Components of `observation` that are x, -1 being the last; None for all.
         units: What each x is divided by, in the unit of x.
 
@@ -54,19 +55,17 @@ class SymlogOffsets(BaseFeaturesExtractor):
     ):
         sizes = {key: int(np.prod(one.shape or ())) for key, one in space.spaces.items()}
         if set(sizes) != {"observation", "achieved_goal", "desired_goal"}:
-            raise UsageError(f"SymlogPolicy requires observations with goals, not {space}")
-        last, goal = sizes["observation"] - 1, sizes["desired_goal"]
-        if any(not 0 <= index <= last for pair in differences for index in pair):
-            raise UsageError(
-                f"differences is {differences}, should have pairs of components of the "
-                f"observation, 0 to {last}"
-            )
-        if any(not -last - 1 <= index <= last for index in components or ()):
-            raise UsageError(
-                f"components is {components}, should have components of the observation, "
-                f"{-last - 1} to {last}"
-            )
-        chosen = np.arange(last + 1)[slice(None) if components is None else list(components)]
+            raise UsageError(f"symlog policies require observations with goals, not {space}")
+        size, goal = sizes["observation"], sizes["desired_goal"]
+        pairs = [index for pair in differences for index in pair]
+        for name, indices in (("differences", pairs), ("components", components or ())):
+            if any(not -size <= index < size for index in indices):
+                value = differences if name == "differences" else components
+                raise UsageError(
+                    f"{name} is {value}, should have components of the observation, {-size} to "
+                    f"{size - 1}"
+                )
+        chosen = range(size) if components is None else [index % size for index in components]
         observed = len(chosen)
         rows = observed + goal + len(differences)
         super().__init__(space, rows * len(units))
@@ -74,14 +73,14 @@ class SymlogOffsets(BaseFeaturesExtractor):
         ends = np.cumsum(list(sizes.values()))
         first = dict(zip(sizes, ends - list(sizes.values()), strict=True))
         x = torch.zeros(rows, int(ends[-1]))
-        for row, component in enumerate(chosen.tolist()):
+        for row, component in enumerate(chosen):
             x[row, first["observation"] + component] = 1.0
         for row in range(goal):
             x[observed + row, first["desired_goal"] + row] = 1.0
             x[observed + row, first["achieved_goal"] + row] = -1.0
         for row, (a, b) in enumerate(differences, start=observed + goal):
-            x[row, first["observation"] + a] = 1.0
-            x[row, first["observation"] + b] = -1.0
+            x[row, first["observation"] + a % size] = 1.0
+            x[row, first["observation"] + b % size] = -1.0
         self.register_buffer("matrix", torch.cat([x / unit for unit in units]))
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
@@ -99,17 +98,11 @@ class Symlog:
         **kwargs: As for the policy.
     """
 
-    def __init__(
-        self,
-        *args: Any,
-        differences: Sequence[Sequence[int]] = (),
-        components: Sequence[int] | None = None,
-        units: Sequence[float] = UNITS,
-        **kwargs: Any,
-    ):
-        features = {"differences": differences, "components": components, "units": units}
+    def __init__(self, *args: Any, **kwargs: Any):
+        own = {name: kwargs.pop(name) for name in SYMLOG_RULES if name in kwargs}
+        saved = kwargs.get("features_extractor_kwargs") or {}  # of a saved policy
         kwargs["features_extractor_class"] = SymlogOffsets
-        kwargs["features_extractor_kwargs"] = features  # Stable-Baselines3 saves them too
+        kwargs["features_extractor_kwargs"] = {**saved, **own}
         super().__init__(*args, **kwargs)
 
 

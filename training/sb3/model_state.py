@@ -68,7 +68,10 @@ def state_files(model: BaseAlgorithm, notes: dict[str, Any]) -> dict[str, bytes]
         "parameters": model.get_parameters(),
         "variables": {name: getattr(model, name).detach() for name in variables},
         "statistics": {
-            name: {key: torch.as_tensor(getattr(one, key)) for key in ("mean", "var", "count")}
+            name: {
+                key: torch.as_tensor(np.asarray(getattr(one, key)))  # count too in double precision
+                for key in ("mean", "var", "count")
+            }
             for name, one in _statistics(model.get_vec_normalize_env()).items()
         },
         "random": torch.get_rng_state(),

@@ -18,16 +18,16 @@ from training.settings.settings import (
     text,
 )
 
+# import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3
 BOUNDED_POLICY = "training.policies.bounded.BoundedPolicy"
 OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
 SYMLOG_POLICY = "training.policies.symlog.SymlogPolicy"
 SYMLOG_PPO_POLICY = "training.policies.symlog.SymlogActorCriticPolicy"
 BOUNDED_SYMLOG_POLICY = "training.policies.symlog.BoundedSymlogPolicy"
-PPO_POLICIES = (BOUNDED_POLICY, SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
-MIN_STD_POLICIES = (BOUNDED_POLICY, BOUNDED_SYMLOG_POLICY)
-SYMLOG_POLICIES = (SYMLOG_POLICY, SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
-SAC_POLICIES = (OFFSET_POLICY, SYMLOG_POLICY)
-"""Import paths: rl-baselines3-zoo expects one for a policy outside Stable-Baselines3."""
+BOUNDED_POLICIES = (BOUNDED_POLICY, BOUNDED_SYMLOG_POLICY)
+SYMLOG_PPO_POLICIES = (SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
+PPO_POLICIES = ("MultiInputPolicy", BOUNDED_POLICY, *SYMLOG_PPO_POLICIES)
+SAC_POLICIES = ("MultiInputPolicy", OFFSET_POLICY, SYMLOG_POLICY)
 HER_RULES = {
     "n_sampled_goal": integer(1),
     "goal_selection_strategy": choice("future", "final", "episode"),
@@ -39,8 +39,9 @@ class PPOConfig(TrainConfig):
     """Settings of proximal policy optimisation (PPO)."""
 
     algo: ClassVar[str] = "ppo"
+    symlog_policies: ClassVar[tuple[str, ...]] = SYMLOG_PPO_POLICIES
 
-    policy: str = setting(choice("MultiInputPolicy", *PPO_POLICIES), "MultiInputPolicy")
+    policy: str = setting(choice(*PPO_POLICIES), "MultiInputPolicy")
     """Policy class; training.policies.bounded.BoundedPolicy keeps the mean action within ±1,
     training.policies.symlog.SymlogActorCriticPolicy observes on a logarithmic scale,
     training.policies.symlog.BoundedSymlogPolicy does both."""
@@ -63,11 +64,10 @@ class PPOConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        if "min_std" in self.policy_kwargs and self.policy not in MIN_STD_POLICIES:
+        if "min_std" in self.policy_kwargs and self.policy not in BOUNDED_POLICIES:
             raise UsageError(
-                f"{where}: policy_kwargs: min_std requires policy: {' or '.join(MIN_STD_POLICIES)}"
+                f"{where}: policy_kwargs: min_std requires policy: {' or '.join(BOUNDED_POLICIES)}"
             )
-        _check_symlog(self, where)
         rollout = self.n_envs * self.n_steps
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:
@@ -87,8 +87,9 @@ class SACConfig(TrainConfig):
     """Settings of soft actor-critic (SAC), optionally with hindsight experience replay (HER)."""
 
     algo: ClassVar[str] = "sac"
+    symlog_policies: ClassVar[tuple[str, ...]] = (SYMLOG_POLICY,)
 
-    policy: str = setting(choice("MultiInputPolicy", *SAC_POLICIES), "MultiInputPolicy")
+    policy: str = setting(choice(*SAC_POLICIES), "MultiInputPolicy")
     """Policy class; training.policies.offsets.OffsetPolicy observes the goal relative to the
     achieved one, training.policies.symlog.SymlogPolicy also on a logarithmic scale."""
     buffer_size: int = setting(integer(1), 1_000_000)
@@ -124,11 +125,11 @@ class SACConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        _check_symlog(self, where)
         if isinstance(self.normalize, dict):
             raise UsageError(
-                f"{where}: normalize is {self.normalize}, should be true or false: SAC's rewards "
-                "are never scaled"
+                f"{where}: normalize is {self.normalize}, should be "
+                f"{'false' if self.policy in self.symlog_policies else 'true or false'}: SAC's "
+                "rewards are never scaled"
             )
         if self.cloning_steps:
             self._check_cloning(where)
@@ -166,22 +167,6 @@ class SACConfig(TrainConfig):
             raise UsageError(
                 f"{where}: ent_coef is {self.ent_coef}, but has no effect with cloning_steps"
             )
-
-
-def _check_symlog(config: TrainConfig, where: str) -> None:
-    """Raises UsageError for settings of symlog policies that contradict the others."""
-    symlog = config.policy in SYMLOG_POLICIES
-    for name in ("differences", "components", "units"):
-        if name in config.policy_kwargs and not symlog:
-            raise UsageError(
-                f"{where}: policy_kwargs: {name} requires policy: {' or '.join(SYMLOG_POLICIES)}"
-            )
-    if config.norm_obs and symlog:
-        only_rewards = " or {norm_obs: false}" if config.algo == "ppo" else ""
-        raise UsageError(
-            f"{where}: normalize is {config.normalize}, should be false{only_rewards} with "
-            f"{config.policy}, whose units are metres"
-        )
 
 
 ALGORITHMS: dict[str, type[TrainConfig]] = {kind.algo: kind for kind in (PPOConfig, SACConfig)}

@@ -49,10 +49,9 @@ NETWORK_RULES = {
     "activation": choice("tanh", "relu", "elu"),
     "log_std_init": number(),
     "min_std": number(at_least=0),
-    "differences": index_pairs,
-    "components": indices,
-    "units": positive_numbers,
 }
+SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
+"""Further ones, of the symlog policies alone."""
 
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
 """Arguments of VecNormalize that say what is scaled, both true by default."""
@@ -64,6 +63,8 @@ class TrainConfig:
 
     algo: ClassVar[str]
     """Name of the algorithm, as in configs/<algo>.yaml."""
+    symlog_policies: ClassVar[tuple[str, ...]] = ()
+    """Import paths of the algorithm's symlog policies."""
 
     env_id: str
     """Environment id, as in RigidEnvs/Push-v0."""
@@ -100,7 +101,7 @@ class TrainConfig:
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3 for dict observations."""
-    policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES), {})
+    policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES | SYMLOG_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
     relu for SAC, as in Stable-Baselines3), min_std (bounded policies only), differences,
     components and units (symlog policies only)."""
@@ -196,6 +197,19 @@ class TrainConfig:
             raise UsageError(
                 f"{where}: target_success_rate is {self.target_success_rate}, but eval_freq is 0: "
                 "only an evaluation can reach it"
+            )
+        symlog = self.policy in self.symlog_policies
+        for name in SYMLOG_RULES:
+            if name in self.policy_kwargs and not symlog:
+                raise UsageError(
+                    f"{where}: policy_kwargs: {name} requires policy: "
+                    f"{' or '.join(self.symlog_policies)}"
+                )
+        if self.norm_obs and symlog:
+            only_rewards = " or {norm_obs: false}" if self.algo == "ppo" else ""
+            raise UsageError(
+                f"{where}: normalize is {self.normalize}, should be false{only_rewards} with "
+                f"{self.policy}, which has units of its own"
             )
         if bool(self.finetune_timesteps) != bool(self.finetune_env_kwargs):
             raise UsageError(

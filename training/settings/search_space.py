@@ -33,7 +33,7 @@ class OneOf:
 
 SPACES: dict[str, dict[str, LogUniform | OneOf]] = {
     "ppo": {
-        "learning_rate": LogUniform(1e-4, 5e-3),
+        "learning_rate": LogUniform(1e-4, 1e-2),
         "gamma": OneOf((0.9, 0.93, 0.95, 0.97, 0.98, 0.99)),
         "n_steps": OneOf((10, 25, 50, 100)),
         "minibatches": OneOf((4, 8, 16, 32)),  # per update: n_envs × n_steps / batch_size

@@ -135,11 +135,14 @@ def layer_widths(value: Any) -> list[int]:
 
 
 def positive_numbers(value: Any) -> list[float]:
-    """Numbers above 0, as in [0.1, 0.01]."""
+    """One or more numbers above 0, as in [0.1, 0.01]."""
     try:
-        return [number(above=0)(entry) for entry in _check_type(list, value)]
+        numbers = [number(above=0)(entry) for entry in _check_type(list, value)]
     except InvalidValue:
-        raise InvalidValue("a list of numbers above 0, as in [0.1, 0.01]") from None
+        numbers = []
+    if not numbers:
+        raise InvalidValue("a list of one or more numbers above 0, as in [0.1, 0.01]")
+    return numbers
 
 
 def true_false_or(keys: Mapping[str, Rule]) -> Rule:
@@ -165,8 +168,7 @@ def indices(value: Any) -> list[int]:
 def index_pairs(value: Any) -> list[list[int]]:
     """Pairs of indices, as in [[8, 0], [9, 1]]."""
     try:
-        pairs = [[integer(0)(index) for index in _check_type(list, pair)]
-                 for pair in _check_type(list, value)]  # fmt: skip
+        pairs = [indices(pair) for pair in _check_type(list, value)]
     except InvalidValue:
         pairs = [[]]
     if any(len(pair) != 2 for pair in pairs):

@@ -18,10 +18,12 @@ from training.policies.symlog import (
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
-from training.settings.algorithms import SYMLOG_POLICIES, SYMLOG_POLICY, SYMLOG_PPO_POLICY
+from training.settings.algorithms import SYMLOG_POLICY, SYMLOG_PPO_POLICIES, SYMLOG_PPO_POLICY
+from training.settings.config_file import load_config
+from training.settings.environments import make_vector_env
 from training.settings.errors import UsageError
 
-PAIRS = [[1, 0], [0, 1]]
+PAIRS = [[1, 0], [0, -1]]
 
 
 def test_features_are_logarithms_of_observation_goal_offset_and_differences():
@@ -53,21 +55,23 @@ def check(found, features, components, units):
 def test_a_saved_policy_keeps_its_features(tmp_path, algorithm, policy):
     kwargs = {"differences": PAIRS, "components": [1], "units": [0.1]}
     model = algorithm(policy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
-    matrices = matrices_of(model)
+    matrices = matrices_of(model.policy)
     model.save(tmp_path / "model.zip")
-    kept = matrices_of(algorithm.load(tmp_path / "model.zip"))
-    for one in (*matrices, *kept):
+    model.policy.save(tmp_path / "policy.pt")
+    kept = matrices_of(algorithm.load(tmp_path / "model.zip").policy)
+    alone = matrices_of(policy.load(tmp_path / "policy.pt"))
+    for one in (*matrices, *kept, *alone):
         assert torch.equal(one, matrices[0])
 
 
-def matrices_of(model):
-    found = [one for one in model.policy.modules() if isinstance(one, SymlogOffsets)]
+def matrices_of(policy):
+    found = [one for one in policy.modules() if isinstance(one, SymlogOffsets)]
     assert found
     assert not any(list(one.parameters()) for one in found)
     return [one.matrix for one in found]
 
 
-@pytest.mark.parametrize("policy", SYMLOG_POLICIES)
+@pytest.mark.parametrize("policy", [SYMLOG_POLICY, *SYMLOG_PPO_POLICIES])
 def test_policy_file_acts_as_the_policy(quick_sac, quick_ppo, tmp_path, policy):
     quick = quick_sac if policy == SYMLOG_POLICY else quick_ppo
     kwargs = {**quick.policy_kwargs, "differences": PAIRS, "components": [1], "units": [0.1]}
@@ -86,9 +90,9 @@ def test_policy_file_acts_as_the_policy(quick_sac, quick_ppo, tmp_path, policy):
 def test_wrong_spaces_components_and_algorithms_raise(quick_ppo, quick_sac):
     box = spaces.Box(-1.0, 1.0, (3,))
     goals = spaces.Dict(dict.fromkeys(("observation", "achieved_goal", "desired_goal"), box))
-    with pytest.raises(UsageError, match="requires observations with goals, not Dict"):
+    with pytest.raises(UsageError, match="require observations with goals, not Dict"):
         SymlogOffsets(spaces.Dict({"observation": box}))
-    with pytest.raises(UsageError, match=r"differences is \[\[0, 3\]\], should .* 0 to 2"):
+    with pytest.raises(UsageError, match=r"differences is \[\[0, 3\]\], should .* -3 to 2"):
         SymlogOffsets(goals, [[0, 3]])
     with pytest.raises(UsageError, match=r"components is \[3\], should have .* -3 to 2"):
         SymlogOffsets(goals, components=[3])
@@ -102,13 +106,48 @@ def test_wrong_spaces_components_and_algorithms_raise(quick_ppo, quick_sac):
         UsageError, match=r"in which components is a list of indices, as in \[0, 1, -1\]"
     ):
         quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"components": [0.5]})
-    with pytest.raises(UsageError, match=r"in which units is a list of numbers above 0"):
-        quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"units": [0.1, 0]})
+    for wrong in ([0.1, 0], []):
+        with pytest.raises(UsageError, match=r"in which units is a list of one or more numbers ab"):
+            quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"units": wrong})
     with pytest.raises(UsageError, match=r"normalize is \{'norm_obs': False\}, should be true or"):
         quick_sac.replace(normalize={"norm_obs": False})
     for quick, policy in ((quick_sac, SYMLOG_POLICY), (quick_ppo, SYMLOG_PPO_POLICY)):
         with pytest.raises(UsageError, match=r"normalize is True, .* with training."):
             quick.replace(policy=policy, normalize=True)
-    for wrong in ([[1]], [[1, -1]], [1, 2], "8-0"):
+    for wrong in ([[1]], [[1, 0.5]], [1, 2], "8-0"):
         with pytest.raises(UsageError, match=r"a list of pairs of indices, as in \[\[8, 0\]"):
             quick_sac.replace(policy=SYMLOG_POLICY, policy_kwargs={"differences": wrong})
+
+
+@pytest.mark.parametrize("blocks", [2, 5])
+def test_the_components_of_stack_are_those_that_its_settings_name(blocks):
+    names = names_of("RigidEnvs/Stack-v0", blocks=blocks, randomize={"mass": [0.5, 2.0]})
+    chosen = components_of("RigidEnvs/Stack-v0", names)
+    guide = ("hand to next cube", "next cube to its goal")
+    assert chosen == [
+        "hand z", *(f"hand velocity {a}" for a in "xyz"), "opening", "opening velocity",
+        "hand reference z", *(f"{name} {a}" for name in guide for a in "xyz"), "fraction placed",
+    ]  # fmt: skip
+
+
+def test_the_components_of_push_are_those_that_its_settings_name():
+    assert components_of("RigidEnvs/Push-v0", names_of("RigidEnvs/Push-v0")) == [
+        "finger z", *(f"finger velocity {a}" for a in "xyz"), "cube velocity x", "cube velocity y",
+        *(f"finger to cube {a}" for a in "xyz"),
+    ]  # fmt: skip
+
+
+def names_of(env_id, **arguments):
+    arguments = {**load_config("ppo", env_id).env_kwargs, **arguments}
+    env = make_vector_env(env_id, 1, **arguments)
+    task = env.unwrapped.task
+    names = [name for name, *_ in task.bounds]
+    if arguments.get("observe_task_guide"):
+        names += [name for name, *_ in task.guide_bounds]
+    assert len(names) == env.single_observation_space["observation"].shape[0]
+    env.close()
+    return names
+
+
+def components_of(env_id, names):
+    return [names[index] for index in load_config("ppo", env_id).policy_kwargs["components"]]

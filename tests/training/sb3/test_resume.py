@@ -134,8 +134,9 @@ def test_sac_resumes_with_its_replay_buffer(quick_sac, tmp_path, monkeypatch, he
     assert steps_of(folder) == sorted(set(steps_of(folder)))
 
 
-def test_model_is_restored_completely(quick_ppo, tmp_path, monkeypatch):
-    config = quick_ppo.replace(n_timesteps=400, normalize=True)
+@pytest.mark.parametrize("normalize", [True, {"norm_obs": False}])
+def test_model_is_restored_completely(quick_ppo, tmp_path, monkeypatch, normalize):
+    config = quick_ppo.replace(n_timesteps=400, normalize=normalize)
     saved = []
     save = checkpoint_module.state_files
     monkeypatch.setattr(
@@ -165,7 +166,10 @@ def test_model_is_restored_completely(quick_ppo, tmp_path, monkeypatch):
 
 
 def mean_of(model) -> np.ndarray:
-    return model.get_vec_normalize_env().obs_rms["observation"].mean
+    statistics = model.get_vec_normalize_env()
+    observations = statistics.obs_rms["observation"].mean if statistics.norm_obs else []
+    rewards = statistics.ret_rms
+    return np.array([*observations, rewards.mean, rewards.var, rewards.count])
 
 
 def drawn(model) -> tuple:

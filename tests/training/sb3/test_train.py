@@ -10,7 +10,7 @@ from training.policies.trained_policy import trained_policy
 from training.results.plot import plot_learning_curves, read_learning_curve
 from training.runs.run_folder import LOCK
 from training.sb3 import train as train_module
-from training.sb3.build import LinearSchedule
+from training.sb3.build import LinearSchedule, worlds_and_model
 from training.sb3.train import train
 from training.settings.errors import UsageError
 
@@ -51,6 +51,23 @@ def test_sac_with_her_trains(quick_sac, tmp_path):
     result = train(quick_sac, tmp_path, quiet=True)
     assert result.steps == 200
     assert trained_policy(result.folder.path).name.startswith("sac")
+
+
+@pytest.mark.parametrize(
+    ("normalize", "scaled"),
+    [
+        (True, (True, True)),
+        (False, None),
+        ({}, (True, True)),
+        ({"norm_obs": False}, (False, True)),
+        ({"norm_reward": False}, (True, False)),
+        ({"norm_obs": False, "norm_reward": False}, None),
+    ],
+)
+def test_normalize_says_what_is_scaled(quick_ppo, normalize, scaled):
+    with worlds_and_model(quick_ppo.replace(normalize=normalize), "cpu", 1) as (_, model):
+        env = model.get_vec_normalize_env()
+    assert (None if env is None else (env.norm_obs, env.norm_reward)) == scaled
 
 
 def test_normalization_is_saved_and_used(quick_ppo, tmp_path):
