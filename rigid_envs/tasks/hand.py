@@ -136,10 +136,6 @@ class Hand:
         opening = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
         return np.clip(opening, 0.0, self.max_opening)
 
-    def opening_ratio(self, now: Readout) -> Array:
-        """Commanded opening divided by opening [count], at most 1."""
-        return np.minimum(self.commanded_opening(now) / np.maximum(self.opening(now), 1e-3), 1.0)
-
     def observe(self, now: Readout, out: Array) -> None:
         """Writes the components [count, 11] that `bounds` names."""
         velocity = now.linear_velocity

@@ -276,14 +276,15 @@ class Stack(Task):
         at_goal = distance(cube.position, cube.goal) <= THRESHOLD
         # open fingers around a cube are rewarded for starting to close
         around = np.all(np.abs(hand - cube.position) < HALF, axis=1)
-        closing = 1.0 - self.hand.commanded_opening(now) / self.hand.max_opening
+        opened = self.hand.commanded_opening(now) / self.hand.max_opening
         terms = {
             "reach": proximity(path_length(hand, cube.position)),
             # 1 at the goal too, so that letting go of the cube there costs nothing
-            "grasp": np.where(at_goal | cube.held, 1.0, around * np.minimum(closing, 0.5)),
+            "grasp": np.where(at_goal | cube.held, 1.0, around * np.minimum(1.0 - opened, 0.5)),
             "place": proximity(path_length(cube.position, cube.goal)),
-            # rises as soon as the action asks for a weaker grip, before the fingers move
-            "release": at_goal * self.hand.opening_ratio(now),
+            # rises as soon as the action asks for a weaker grip, before the fingers move; a grip
+            # that still holds earns less than half of it
+            "release": at_goal * opened,
         }
         terms = {name: np.where(all_placed, 1.0, term) for name, term in terms.items()}
         stage = sum(weight * terms[name] for name, weight in STAGE_WEIGHTS.items())

@@ -97,6 +97,8 @@ class RuleWrapper:
             raise TypeError(
                 f"{type(self).__name__} wraps environments whose action space is a Box, got {space}"
             )
+        if self.rule.needs_action:
+            self.rule.check_actions(space.shape[-1] if space.shape else 1)
 
     def _check_was_reset(self) -> None:
         if not self._was_reset:

@@ -89,6 +89,9 @@ class Rule(ABC):
         """Whether the stored terms or the info terms are valid only for the goals of the step."""
         return False
 
+    def check_actions(self, size: int) -> None:  # noqa: B027  (most rules have nothing to check)
+        """Raises ValueError if the rule's arguments contradict actions of `size` components."""
+
     def memory(self, observation: Observation, action: Array) -> Array | None:
         """What the next step needs of this one, [..., k] or [...]; at a reset, `action` is NaN."""
         return None

@@ -1,11 +1,12 @@
 """Rules with short formulas: penalties on actions and time, a bonus, scaling and bounding."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from physics.scene.validation import number, positive
+from physics.scene.validation import instance, integer, number, positive
 from rigid_envs.wrappers.rule import Goals, Observation, Rule, Terms, Transition
 
 Array = np.ndarray
@@ -24,9 +25,12 @@ class ActionPenalty(Rule):
 
     Args:
         weight: at least 0.
+        components: of the action, counted from 0, that `|a|^2` sums over; None for all. Leave out
+            components whose 0 is a value like others, as the grip of Stack's hand.
     """
 
     weight: float
+    components: Sequence[int] | None = None
 
     needs_action = True
     stored_terms = ("action_square",)
@@ -35,10 +39,24 @@ class ActionPenalty(Rule):
     def __post_init__(self) -> None:
         """Checks the arguments."""
         object.__setattr__(self, "weight", number("weight", self.weight, low=0.0))
+        if self.components is not None:
+            given = instance("components", self.components, list, tuple)
+            chosen = [integer(f"components[{i}]", x, low=0) for i, x in enumerate(given)]
+            if not chosen or len(set(chosen)) < len(chosen):
+                raise ValueError(f"components must name at least one, and none twice, got {given}")
+            object.__setattr__(self, "components", chosen)
+
+    def check_actions(self, size: int) -> None:
+        """Raises ValueError if actions have no such components."""
+        if self.components is not None and max(self.components) >= size:
+            raise ValueError(
+                f"components must be below {size}, the size of an action, got {self.components}"
+            )
 
     def step_terms(self, memory: Any, step: Transition) -> Terms:
         """`|a|^2`."""
-        return {"action_square": np.sum(step.action**2, axis=-1)}
+        action = step.action if self.components is None else step.action[..., self.components]
+        return {"action_square": np.sum(action**2, axis=-1)}
 
     def apply(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
         """See the class."""

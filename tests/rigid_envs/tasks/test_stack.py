@@ -171,6 +171,9 @@ def test_a_tower_is_solved_only_when_let_go():
     assert info["place"] > 0.9
     assert info["release"] < 0.2
     assert not info["is_success"]
+    weak = env.step(np.array([0.0, 0.0, 0.0, -0.5]))[4]
+    assert weak["release"] == pytest.approx(0.25)
+    assert not weak["is_success"]
     assert observation["achieved_goal"][-1] == 0.0
     for _ in range(5):
         observation, reward, _, _, info = env.step(release)

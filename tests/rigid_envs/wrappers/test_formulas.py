@@ -127,6 +127,17 @@ def test_the_info_of_a_step_contains_the_raw_terms(name, terms):
     assert set(info) - set(first) - {f"_{key}" for key in info} == terms
 
 
+def test_a_penalty_counts_the_chosen_components_of_the_action():
+    plain, wrapped = gym.make(PUSH), wrappers.ActionPenalty(gym.make(PUSH), 0.5, components=(0, 2))
+    plain.reset(seed=0)
+    wrapped.reset(seed=0)
+    action = np.array([0.5, 1.0, -2.0])
+    reward, info = wrapped.step(action)[1::3]
+    assert info["action_square"] == 0.5**2 + 1.0
+    assert reward == plain.step(action)[1] - 0.5 * 1.25
+    assert gym.make(wrapped.spec).rule.components == [0, 2]
+
+
 def test_a_stage_pays_nothing_before_all_stages_before_it_are_complete():
     envs = wrappers.vector.StagedReward(
         make_vec(3), [Stage("reach", -0.5, -0.0001), Stage("distance", -0.4, -0.05)]
