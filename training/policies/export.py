@@ -16,8 +16,16 @@ from stable_baselines3.sac.policies import SACPolicy
 
 from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import GoalOffsets
+from training.policies.pixels import SHARPNESS, KeypointFeatures
 from training.policies.policy_file import SUFFIX, PolicyFile, load_policy_file
-from training.policies.policy_header import Environment, Header, Network, Normalization, Success
+from training.policies.policy_header import (
+    Environment,
+    Header,
+    Keypoints,
+    Network,
+    Normalization,
+    Success,
+)
 from training.policies.symlog import SymlogOffsets
 from training.runs.run_folder import RunFolder, atomic_write, git_commit, package_versions
 from training.settings.config import TrainConfig
@@ -96,6 +104,17 @@ def policy_file_of(
             f"policy files support dict observations and box actions, not {space}, {actions}"
         )
     layers, activation, features = _layers(model)
+    shapes = {key: tuple(one.shape or ()) for key, one in space.spaces.items()}
+    filters: list[tuple[np.ndarray, np.ndarray]] = []
+    points = None
+    extractor: Any = model.policy.features_extractor
+    if isinstance(extractor, KeypointFeatures):
+        filters, points = _keypoints(extractor)
+        channels, height, width = shapes["observation"]  # as the network has it
+        shapes = {
+            "observation": (height, width, channels),
+            "desired_goal": shapes["desired_goal"],
+        }
     env_id = config.env_id.rpartition(":")[2]  # without "module:"
     version = re.search(r"-v(\d+)$", env_id)
     if version is None:
@@ -105,7 +124,7 @@ def policy_file_of(
     header = Header(
         algorithm=config.algo,
         environment=Environment(env_id, int(version[1]), config.final_env_kwargs),
-        observation={key: tuple(one.shape or ()) for key, one in space.spaces.items()},
+        observation=shapes,
         network=Network(
             widths=[layers[0][0].shape[1], *(len(biases) for _, biases in layers)],
             activation=activation,
@@ -113,6 +132,7 @@ def policy_file_of(
             low=[float(x) for x in actions.low.flatten()],
             high=[float(x) for x in actions.high.flatten()],
             features=features,
+            keypoints=points,
         ),
         normalization=scaling,
         success=success,
@@ -121,7 +141,7 @@ def policy_file_of(
         commit=git_commit(),
         versions=package_versions(),
     )
-    return PolicyFile(header, mean, variance, layers)
+    return PolicyFile(header, mean, variance, layers, filters)
 
 
 def _squashing(policy: Any) -> str:
@@ -144,7 +164,7 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
         raise UsageError(f"policy files support PPO and SAC, not {type(model).__name__}")
     between = [module for module in modules if not isinstance(module, torch.nn.Linear)]
     kinds = {type(module) for module in between}
-    own = isinstance(extractor, GoalOffsets | SymlogOffsets)
+    own = isinstance(extractor, GoalOffsets | SymlogOffsets | KeypointFeatures)
     flat = own or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
     alternate = len(modules) == 2 * len(between) + 1
     if not flat or not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
@@ -156,11 +176,24 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
     features = "linear"
     if isinstance(extractor, GoalOffsets):  # a linear map: merge it into the first layer
         layers[0] = (_numbers(linear[0].weight.double() @ extractor.matrix.double()), layers[0][1])
+    if isinstance(extractor, KeypointFeatures):  # factors of the features: merge them likewise
+        layers[0] = (layers[0][0] * _numbers(extractor.factors), layers[0][1])
     if isinstance(extractor, SymlogOffsets):
         matrix = _numbers(extractor.matrix)
         layers.insert(0, (matrix, np.zeros(len(matrix), np.float32)))
         features = "symlog"
     return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh", features
+
+
+def _keypoints(
+    extractor: KeypointFeatures,
+) -> tuple[list[tuple[np.ndarray, np.ndarray]], Keypoints]:
+    """Weights and biases of the convolutions, and their description."""
+    chain = [module for module in extractor.net if isinstance(module, torch.nn.Conv2d)]
+    filters = [(_numbers(one.weight), _numbers(one.bias)) for one in chain]
+    filters[-1] = (SHARPNESS * filters[-1][0], SHARPNESS * filters[-1][1])
+    sizes = [[one.out_channels, one.kernel_size[0], one.stride[0]] for one in chain]
+    return filters, Keypoints("observation", sizes)
 
 
 def _statistics(env: VecNormalize | None) -> tuple[Normalization | None, Any, Any]:
@@ -174,5 +207,5 @@ def _statistics(env: VecNormalize | None) -> tuple[Normalization | None, Any, An
     return Normalization(keys, float(env.epsilon), float(env.clip_obs)), mean, variance
 
 
-def _numbers(parameter: torch.Tensor) -> np.ndarray:
+def _numbers(parameter: Any) -> np.ndarray:
     return parameter.detach().cpu().numpy().astype(np.float32)

@@ -3,7 +3,8 @@
 They are files of safetensors, which many programs can read. Their metadata have one entry,
 `rigid-envs policy`: a JSON object with the version of the `format`, the `header`, and the `sha256`
 of header and numbers. The tensors are `mean.KEY` and `variance.KEY` (float64) of each normalised
-observation key, and `layer.N.weight` (outputs, inputs) and `layer.N.bias` (float32) of each layer.
+observation key, and `layer.N.weight` (outputs, inputs) and `layer.N.bias` (float32) of each layer;
+if it acts from pixels, also `filter.N.weight` (outputs, inputs, k, k) and `filter.N.bias`.
 
 A file with any changed byte is rejected. Stable-Baselines3's own files are pickles, which can run
 any code when loaded.
@@ -13,7 +14,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from safetensors.numpy import load, save
 from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
+from training.policies.keypoints import keypoints
 from training.policies.policy import Policy
 from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
@@ -63,6 +65,8 @@ class PolicyFile:
     """Variances by observation key, likewise."""
     layers: list[tuple[np.ndarray, np.ndarray]]
     """Weights (outputs, inputs) and biases (outputs,), float32, of each layer in order."""
+    filters: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    """Likewise (outputs, inputs, k, k) and (outputs,) of the convolutions that find keypoints."""
 
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """The mean action, equal to Stable-Baselines3's `predict(deterministic=True)`.
@@ -71,7 +75,7 @@ class PolicyFile:
         run on one thread: the threads of BLAS would spin on the cores that the worlds need.
 
         Args:
-            observation: `{key: (n, ...)}`, with the keys of the header.
+            observation: `{key: (n, ...)}`, with at least the keys of the header.
 
         Returns:
             (n, action_dim) float32 within the bounds of the action.
@@ -80,8 +84,11 @@ class PolicyFile:
             UsageError: The keys or shapes differ from those that the policy was trained on.
         """
         header = self.header
-        given = {key: np.asarray(value).shape[1:] for key, value in observation.items()}
-        unbatched = {key: np.asarray(value).shape for key, value in observation.items()}
+        read = {
+            key: np.asarray(observation[key]) for key in header.observation if key in observation
+        }
+        given = {key: value.shape[1:] for key, value in read.items()}
+        unbatched = {key: value.shape for key, value in read.items()}
         if unbatched == header.observation:
             raise UsageError(
                 "the observation has no batch axis; add one: "
@@ -92,13 +99,15 @@ class PolicyFile:
                 f"the policy requires observations of shapes {header.observation}, but the "
                 f"environment has {given}; does it have the same arguments as in training?"
             )
-        parts = []
+        points, parts = header.network.keypoints, []
         for key in header.observation:  # in the order of the network's inputs
-            value = np.asarray(observation[key])
+            value = read[key]
             if header.normalization is not None and key in self.mean:
                 scale = np.sqrt(self.variance[key] + header.normalization.epsilon)
                 clip = header.normalization.clip
                 value = np.clip((value - self.mean[key]) / scale, -clip, clip)
+            if points is not None and key == points.key:
+                value = keypoints(value, self.filters, [one[-1] for one in points.filters])
             parts.append(value.astype(np.float32).reshape(len(value), -1))
         x = np.concatenate(parts, axis=1).astype(np.float64)
         names = [header.network.activation] * len(self.layers)
@@ -141,8 +150,9 @@ class PolicyFile:
     def _tensors(self) -> dict[str, np.ndarray]:
         named = {f"mean.{key}": array for key, array in self.mean.items()}
         named |= {f"variance.{key}": array for key, array in self.variance.items()}
-        for n, (weight, bias) in enumerate(self.layers):
-            named |= {f"layer.{n}.weight": weight, f"layer.{n}.bias": bias}
+        for kind, parameters in (("layer", self.layers), ("filter", self.filters)):
+            for n, (weight, bias) in enumerate(parameters):
+                named |= {f"{kind}.{n}.weight": weight, f"{kind}.{n}.bias": bias}
         return named
 
 
@@ -188,10 +198,10 @@ def load_policy_file(path: Path) -> PolicyFile:
         raise UsageError(f"{path} is damaged: its checksum is wrong; copy or export it again")
     try:
         checked = read_header(header)
-        mean, variance, layers = _arrays(checked, tensors)
+        arrays = _arrays(checked, tensors)
     except InvalidHeader as error:
         raise UsageError(f"{path}: {error}") from None
-    return PolicyFile(checked, mean, variance, layers)
+    return PolicyFile(checked, *arrays)
 
 
 def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None = None) -> Policy:
@@ -252,11 +262,18 @@ def _tensors_of(header: Header) -> dict[str, tuple[tuple[int, ...], str]]:
     for n, (inputs, outputs) in enumerate(pairwise(header.network.widths)):
         tensors[f"layer.{n}.weight"] = (outputs, inputs), "float32"
         tensors[f"layer.{n}.bias"] = (outputs,), "float32"
+    points = header.network.keypoints
+    if points is not None:
+        inputs = header.observation[points.key][-1]
+        for n, (outputs, width, _) in enumerate(points.filters):
+            tensors[f"filter.{n}.weight"] = (outputs, inputs, width, width), "float32"
+            tensors[f"filter.{n}.bias"] = (outputs,), "float32"
+            inputs = outputs
     return tensors
 
 
-def _arrays(header: Header, tensors: dict[str, np.ndarray]) -> tuple[Any, Any, Any]:
-    """Mean, variance and layers, as in PolicyFile.
+def _arrays(header: Header, tensors: dict[str, np.ndarray]) -> tuple[Any, Any, Any, Any]:
+    """Mean, variance, layers and filters, as in PolicyFile.
 
     Raises:
         InvalidHeader: The tensors contradict the header, or a number is not finite.
@@ -277,9 +294,16 @@ def _arrays(header: Header, tensors: dict[str, np.ndarray]) -> tuple[Any, Any, A
     variance = {key: tensors[f"variance.{key}"] for key in keys}
     if any((array < 0).any() for array in variance.values()):
         raise InvalidHeader("a variance is negative")
-    count = len(header.network.widths) - 1
-    layers = [(tensors[f"layer.{n}.weight"], tensors[f"layer.{n}.bias"]) for n in range(count)]
-    return mean, variance, layers
+    points = header.network.keypoints
+    count = {
+        "layer": len(header.network.widths) - 1,
+        "filter": 0 if points is None else len(points.filters),
+    }
+    layers, filters = (
+        [(tensors[f"{kind}.{n}.weight"], tensors[f"{kind}.{n}.bias"]) for n in range(count[kind])]
+        for kind in ("layer", "filter")
+    )
+    return mean, variance, layers, filters
 
 
 def _words(tensor: tuple[tuple[int, ...], str] | None) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from training.policies.keypoints import map_size
+
 SQUASHING = {"ppo": ("clip", "softsign"), "sac": ("tanh",)}
 """How the network's output becomes an action, by algorithm: clipped to the bounds, or squashed."""
 ACTIVATION_NAMES = ("tanh", "relu", "elu")
@@ -30,11 +32,22 @@ class Environment:
 
 
 @dataclass(frozen=True)
+class Keypoints:
+    """The part of a network that finds keypoints in a picture."""
+
+    key: str
+    """Key of the picture in observations."""
+    filters: list[list[int]]
+    """Outputs, kernel width and stride of each convolution; the last makes the maps."""
+
+
+@dataclass(frozen=True)
 class Network:
     """The network from observations to actions."""
 
     widths: list[int]
-    """Width of each layer, from the size of all observations to the size of the action."""
+    """Width of each layer, from the size of all observations to the size of the action. A picture
+    counts with two for each of its keypoints."""
     activation: str
     """Activation between layers: tanh, relu or elu."""
     squashing: str
@@ -46,6 +59,8 @@ class Network:
     features: str = "linear"
     """"symlog": the first layer gives features, and sign(x) ln(1 + |x|) follows it in place of the
     activation. Files without this entry have "linear"."""
+    keypoints: Keypoints | None = None
+    """How the picture is observed; None, as in files without this entry, if there is none."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +98,8 @@ class Header:
     environment: Environment
     """The environment of training."""
     observation: dict[str, tuple[int, ...]]
-    """Shape of one world's observation by key, in the order of the network's inputs."""
+    """Shape of the part of one world's observation that the policy reads, by key, in the order of
+    the network's inputs."""
     network: Network
     """The network from observations to actions."""
     normalization: Normalization | None
@@ -128,15 +144,32 @@ def read_header(values: Any) -> Header:
         commit=_optional(fields["commit"], lambda value: _text(value, "commit")),
         versions=_mapping(fields["versions"], "versions"),
     )
-    inputs = sum(math.prod(shape) for shape in observation.values())
+    inputs = sum(inputs_of(header, key) for key in observation)
     if header.network.widths[0] != inputs:
         raise InvalidHeader(
             f"network.widths starts with {header.network.widths[0]}, should be {inputs}"
         )
+    points = header.network.keypoints
+    if points is not None:
+        _one_of(points.key, "network.keypoints.key", tuple(observation))
+        shape = observation[points.key]
+        if len(shape) != 3 or min(map_size(side, points.filters) for side in shape[:2]) < 1:
+            raise InvalidHeader(
+                f"observation {points.key!r} has the shape {shape}, should be (height, width, "
+                f"channels) of a picture that network.keypoints.filters leave a part of"
+            )
     if header.normalization is not None:
         for key in header.normalization.keys:
             _one_of(key, "normalization.keys", tuple(observation))
     return header
+
+
+def inputs_of(header: Header, key: str) -> int:
+    """Number of the network's inputs from one key of the observation."""
+    keypoints = header.network.keypoints
+    if keypoints is not None and key == keypoints.key:
+        return 2 * keypoints.filters[-1][0]
+    return math.prod(header.observation[key])
 
 
 def _environment(value: Any) -> Environment:
@@ -162,6 +195,7 @@ def _network(value: Any, algorithm: str) -> Network:
         [_number(x, "network.low") for x in _list(fields["low"], "network.low")],
         [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
         _one_of(fields["features"], "network.features", FEATURES),
+        _optional(fields["keypoints"], _keypoints),
     )
     if len(network.widths) < 2 or min(network.widths) < 1:
         raise InvalidHeader(
@@ -180,6 +214,17 @@ def _network(value: Any, algorithm: str) -> Network:
     if any(low > high for low, high in zip(network.low, network.high, strict=True)):
         raise InvalidHeader(f"network.low is {network.low}, should be at most high, {network.high}")
     return network
+
+
+def _keypoints(value: Any) -> Keypoints:
+    fields = _fields(value, "network.keypoints", Keypoints)
+    name = "network.keypoints.filters"
+    filters = [_integers(one, name) for one in _list(fields["filters"], name)]
+    if not filters or any(len(one) != 3 or min(one) < 1 for one in filters):
+        raise InvalidHeader(
+            f"{name} is {filters}, should be a list of [outputs, kernel width, stride]"
+        )
+    return Keypoints(_text(fields["key"], "network.keypoints.key"), filters)
 
 
 def _normalization(value: Any) -> Normalization:

@@ -15,6 +15,7 @@ from stable_baselines3.her import HerReplayBuffer
 from training.datasets.demonstrations import read_demonstrations
 from training.policies.bounded import BoundedPolicy
 from training.policies.offsets import OffsetPolicy
+from training.policies.pixels import PixelPolicy
 from training.policies.symlog import (
     BoundedSymlogPolicy,
     SymlogActorCriticPolicy,
@@ -27,6 +28,7 @@ from training.settings.algorithms import (
     BOUNDED_POLICY,
     BOUNDED_SYMLOG_POLICY,
     OFFSET_POLICY,
+    PIXEL_POLICY,
     SYMLOG_POLICY,
     SYMLOG_PPO_POLICY,
     PPOConfig,
@@ -44,6 +46,7 @@ POLICIES: dict[str, type[BasePolicy]] = {
     SYMLOG_POLICY: SymlogPolicy,
     SYMLOG_PPO_POLICY: SymlogActorCriticPolicy,
     BOUNDED_SYMLOG_POLICY: BoundedSymlogPolicy,
+    PIXEL_POLICY: PixelPolicy,
 }
 ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
 

@@ -24,9 +24,10 @@ OFFSET_POLICY = "training.policies.offsets.OffsetPolicy"
 SYMLOG_POLICY = "training.policies.symlog.SymlogPolicy"
 SYMLOG_PPO_POLICY = "training.policies.symlog.SymlogActorCriticPolicy"
 BOUNDED_SYMLOG_POLICY = "training.policies.symlog.BoundedSymlogPolicy"
+PIXEL_POLICY = "training.policies.pixels.PixelPolicy"
 BOUNDED_POLICIES = (BOUNDED_POLICY, BOUNDED_SYMLOG_POLICY)
 SYMLOG_PPO_POLICIES = (SYMLOG_PPO_POLICY, BOUNDED_SYMLOG_POLICY)
-PPO_POLICIES = ("MultiInputPolicy", BOUNDED_POLICY, *SYMLOG_PPO_POLICIES)
+PPO_POLICIES = ("MultiInputPolicy", BOUNDED_POLICY, *SYMLOG_PPO_POLICIES, PIXEL_POLICY)
 SAC_POLICIES = ("MultiInputPolicy", OFFSET_POLICY, SYMLOG_POLICY)
 HER_RULES = {
     "n_sampled_goal": integer(1),
@@ -39,12 +40,14 @@ class PPOConfig(TrainConfig):
     """Settings of proximal policy optimisation (PPO)."""
 
     algo: ClassVar[str] = "ppo"
-    symlog_policies: ClassVar[tuple[str, ...]] = SYMLOG_PPO_POLICIES
+    symlog_policies: ClassVar[tuple[str, ...]] = (*SYMLOG_PPO_POLICIES, PIXEL_POLICY)
+    pixel_policies: ClassVar[tuple[str, ...]] = (PIXEL_POLICY,)
 
     policy: str = setting(choice(*PPO_POLICIES), "MultiInputPolicy")
     """Policy class; training.policies.bounded.BoundedPolicy keeps the mean action within ±1,
     training.policies.symlog.SymlogActorCriticPolicy observes on a logarithmic scale,
-    training.policies.symlog.BoundedSymlogPolicy does both."""
+    training.policies.symlog.BoundedSymlogPolicy does both, and training.policies.pixels.PixelPolicy
+    acts from a picture while its critic observes the state on a logarithmic scale."""
     n_steps: int = setting(integer(1), 2048)
     """Steps of each world between two updates."""
     n_epochs: int = setting(integer(1), 10)

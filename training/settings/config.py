@@ -16,6 +16,7 @@ from training.settings.settings import (
     InvalidValue,
     boolean,
     choice,
+    filter_list,
     index_pairs,
     indices,
     integer,
@@ -52,7 +53,8 @@ NETWORK_RULES = {
 }
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
 """Further ones, of the symlog policies alone."""
-
+PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1)}
+"""Further ones, of policies that act from pixels."""
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
 """Arguments of VecNormalize that say what is scaled, both true by default."""
 
@@ -65,6 +67,8 @@ class TrainConfig:
     """Name of the algorithm, as in configs/<algo>.yaml."""
     symlog_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of the algorithm's symlog policies."""
+    pixel_policies: ClassVar[tuple[str, ...]] = ()
+    """Import paths of those of the algorithm's policies that act from pixels."""
 
     env_id: str
     """Environment id, as in RigidEnvs/Push-v0."""
@@ -101,10 +105,11 @@ class TrainConfig:
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3 for dict observations."""
-    policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES | SYMLOG_RULES), {})
+    policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES | SYMLOG_RULES | PIXEL_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
     relu for SAC, as in Stable-Baselines3), min_std (bounded policies only), differences,
-    components and units (symlog policies only)."""
+    components and units (symlog policies and PixelPolicy only), filters and keypoints (PixelPolicy
+    only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -199,12 +204,14 @@ class TrainConfig:
                 "only an evaluation can reach it"
             )
         symlog = self.policy in self.symlog_policies
-        for name in SYMLOG_RULES:
-            if name in self.policy_kwargs and not symlog:
-                raise UsageError(
-                    f"{where}: policy_kwargs: {name} requires policy: "
-                    f"{' or '.join(self.symlog_policies)}"
-                )
+        for rules, policies in (
+            (SYMLOG_RULES, self.symlog_policies),
+            (PIXEL_RULES, self.pixel_policies),
+        ):
+            for name in rules:
+                if name in self.policy_kwargs and self.policy not in policies:
+                    required = f"policy: {' or '.join(policies)}" if policies else "PPO"
+                    raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
         if self.norm_obs and symlog:
             only_rewards = " or {norm_obs: false}" if self.algo == "ppo" else ""
             raise UsageError(

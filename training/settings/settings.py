@@ -176,6 +176,21 @@ def index_pairs(value: Any) -> list[list[int]]:
     return pairs
 
 
+def filter_list(value: Any) -> list[list[int]]:
+    """Outputs, kernel width and stride of convolutions, as in [[16, 5, 3], [16, 3, 1]]."""
+    try:
+        filters = [
+            [integer(1)(x) for x in _check_type(list, one)] for one in _check_type(list, value)
+        ]
+    except InvalidValue:
+        filters = [[]]
+    if any(len(one) != 3 for one in filters):
+        raise InvalidValue(
+            "a list of [outputs, kernel width, stride] of convolutions, as in [[16, 5, 3]]"
+        )
+    return filters
+
+
 def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
     """A mapping with text keys; with `keys`, only those are valid, each value under its rule."""
 
