@@ -32,7 +32,10 @@ from training.settings.settings import (
 )
 
 RESULT = "result.json"
-SAME_TASK = ("reward_type", "fidelity", "observe_task_guide")
+SAME_TASK = (
+    "reward_type", "fidelity", "observe_task_guide",
+    "pixels", "pixel_size", "frame_stack", "camera",
+)  # fmt: skip
 """Arguments of the environment that do not change the task to be solved."""
 
 

@@ -49,6 +49,11 @@ def test_names_of_tasks_contain_the_arguments_that_change_the_task():
     )
 
 
+def test_a_task_from_pixels_is_another_one_whatever_the_picture():
+    arguments = {"obs_type": "pixels", "pixel_size": 48, "camera": "top"}
+    assert task_name("RigidEnvs/Push-v0", arguments) == "RigidEnvs-Push-v0-obs_type-pixels"
+
+
 def test_dense_id_is_the_same_task():
     arguments = {"reward_type": "dense", "max_episode_steps": 50}
     assert task_name("RigidEnvs/PushDense-v0", arguments) == "RigidEnvs-Push-v0"
