@@ -30,6 +30,8 @@ HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 
 # dense reward: weights of the terms of the next cube within `stage`
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
+RETREAT_WEIGHT = 0.3
+RETREAT = 0.1  # m above the top cube at which `retreat` is 1
 DECAY_LENGTH = 0.15  # m of path after which `reach` and `place` fall to 1/e
 # Paths lead over other cubes, at the height of their end plus PASS_HEIGHT (m). The extra height
 # falls to 0 while the horizontal distance to the end falls from HALF + DESCENT to HALF (m). Rising
@@ -109,7 +111,8 @@ class Stack(Task):
         # cells, offsets within the cells, and five numbers for the easier starts
         self.draw_count = len(CELL_CENTERS) + 2 * (self.blocks + 1) + 5
         self._grasps: dict[Fidelity, tuple[Array, Array]] = {}
-        self.reward = Reward(THRESHOLD, {"success": 1.0, "stage": 1.0}, time_penalty=2.0)
+        weights = {"success": 1.0, "stage": 1.0, "retreat": RETREAT_WEIGHT}
+        self.reward = Reward(THRESHOLD, weights, time_penalty=2.0)
 
     def scene(self) -> Scene:
         """Cubes on the ground, and an open gripper above them."""
@@ -265,7 +268,7 @@ class Stack(Task):
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`placed`; `reach`, `grasp`, `place` and `release` of the next cube; and `stage`.
+        """`placed`; `reach`, `grasp`, `place` and `release` of the next cube; `stage`; `retreat`.
 
         `placed` is the number of cubes that stand in the tower and are not held. The four terms of
         the next cube lie within 0 and 1. `stage` combines all of them in one number from 0 to 1.
@@ -286,12 +289,18 @@ class Stack(Task):
             # that still holds earns less than half of it
             "release": at_goal * opened,
         }
-        terms = {name: np.where(all_placed, 1.0, term) for name, term in terms.items()}
+        # where all are placed, the last is the next: fingers that are open stay clear of it
+        terms = {
+            name: term if name == "release" else np.where(all_placed, 1.0, term)
+            for name, term in terms.items()
+        }
         stage = sum(weight * terms[name] for name, weight in STAGE_WEIGHTS.items())
+        above = hand[:, 2] - cube.goal[:, 2]
         return {
             "placed": cube.placed.astype(float),
             **terms,
-            "stage": np.where(all_placed, n, cube.placed + stage) / n,
+            "stage": (np.minimum(cube.placed, n - 1) + stage) / n,
+            "retreat": all_placed * np.clip(above / RETREAT, 0.0, 1.0),
         }
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:

@@ -6,8 +6,12 @@ import numpy as np
 import torch
 from stable_baselines3.common.distributions import Distribution
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+from stable_baselines3.common.type_aliases import Schedule
 
 from training.settings.errors import UsageError
+
+LOG_STD_RANGE = (-6.0, 0.5)
+"""Bounds of the logarithm of a standard deviation that depends on the state."""
 
 
 class BoundedPolicy(MultiInputActorCriticPolicy):
@@ -19,9 +23,14 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     deviation shrinks while the first part of a task is learned, so that the next part is not
     explored; `min_std` limits this.
 
+    One standard deviation for all states has to be that of the most delicate one: a tower falls if
+    the hand explores while it lets go. With `state_dependent_std` a linear layer adds to its
+    logarithm in each state, so that the hand still explores on its way.
+
     Args:
         *args: As for Stable-Baselines3's policy.
         min_std: Standard deviation that is added to the learned one.
+        state_dependent_std: Whether the standard deviation depends on the observation.
         **kwargs: As for Stable-Baselines3's policy.
 
     Raises:
@@ -32,19 +41,37 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     action_dist: Any
     log_std: torch.nn.Parameter
 
-    def __init__(self, *args: Any, min_std: float = 0.0, **kwargs: Any):
-        self.min_std = min_std
+    def __init__(
+        self, *args: Any, min_std: float = 0.0, state_dependent_std: bool = False, **kwargs: Any
+    ):
+        self.min_std, self.state_dependent_std = min_std, state_dependent_std
         super().__init__(*args, **kwargs)
         low, high = getattr(self.action_space, "low", 0.0), getattr(self.action_space, "high", 0.0)
         if not (np.all(low == -1.0) and np.all(high == 1.0)):
             raise UsageError(f"BoundedPolicy requires actions within ±1, not {self.action_space}")
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), "min_std": self.min_std}
+        return {
+            **super()._get_constructor_parameters(),
+            "min_std": self.min_std,
+            "state_dependent_std": self.state_dependent_std,
+        }
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        super()._build(lr_schedule)
+        if self.state_dependent_std:
+            layer = torch.nn.Linear(self.mlp_extractor.latent_dim_pi, self.action_net.out_features)
+            torch.nn.init.zeros_(layer.weight)
+            torch.nn.init.zeros_(layer.bias)
+            self.std_net = layer
+            self.optimizer.add_param_group({"params": list(layer.parameters())})
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
         # the gradient of softsign decays more slowly than that of tanh
         mean = torch.nn.functional.softsign(self.action_net(latent_pi))
-        log_std = torch.log(self.min_std + torch.exp(self.log_std))
+        log_std: torch.Tensor = self.log_std
+        if self.state_dependent_std:
+            log_std = (log_std + self.std_net(latent_pi)).clamp(*LOG_STD_RANGE)
+        log_std = torch.log(self.min_std + torch.exp(log_std))
         distribution: Distribution = self.action_dist.proba_distribution(mean, log_std)
         return distribution

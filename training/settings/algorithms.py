@@ -67,10 +67,12 @@ class PPOConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        if "min_std" in self.policy_kwargs and self.policy not in BOUNDED_POLICIES:
-            raise UsageError(
-                f"{where}: policy_kwargs: min_std requires policy: {' or '.join(BOUNDED_POLICIES)}"
-            )
+        for name in ("min_std", "state_dependent_std"):
+            if name in self.policy_kwargs and self.policy not in BOUNDED_POLICIES:
+                raise UsageError(
+                    f"{where}: policy_kwargs: {name} requires policy: "
+                    f"{' or '.join(BOUNDED_POLICIES)}"
+                )
         rollout = self.n_envs * self.n_steps
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:

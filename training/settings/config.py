@@ -50,6 +50,7 @@ NETWORK_RULES = {
     "activation": choice("tanh", "relu", "elu"),
     "log_std_init": number(),
     "min_std": number(at_least=0),
+    "state_dependent_std": boolean,
 }
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
 """Further ones, of the symlog policies alone."""
@@ -107,9 +108,9 @@ class TrainConfig:
     """Policy class of Stable-Baselines3 for dict observations."""
     policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES | SYMLOG_RULES | PIXEL_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
-    relu for SAC, as in Stable-Baselines3), min_std (bounded policies only), differences,
-    components and units (symlog policies and PixelPolicy only), filters and keypoints (PixelPolicy
-    only)."""
+    relu for SAC, as in Stable-Baselines3); min_std and state_dependent_std (bounded policies only);
+    differences, components and units (symlog policies and PixelPolicy only); filters and keypoints
+    (PixelPolicy only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)

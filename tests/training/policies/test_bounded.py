@@ -43,6 +43,29 @@ def test_standard_deviation_has_a_gradient_near_its_floor(model):
     assert (model.policy.log_std.grad.abs() > 0.0).all()
 
 
+def test_standard_deviation_can_depend_on_the_state(tmp_path):
+    env = RigidVecEnv(ReachVectorEnv(4))
+    kwargs = {"min_std": MIN_STD, "log_std_init": -1.0, "state_dependent_std": True}
+    model = PPO(BoundedPolicy, env, policy_kwargs=kwargs, n_steps=4, batch_size=16)
+    new = distribution(model).distribution.stddev.detach()
+    np.testing.assert_allclose(new, np.full((4, 2), np.exp(-1.0) + MIN_STD), rtol=1e-6)
+    before = model.policy.std_net.weight.clone()
+    model.learn(16)
+    assert not torch.equal(model.policy.std_net.weight, before)  # the optimiser has the layer
+    with torch.no_grad():
+        model.policy.std_net.weight[:] = 0.01
+    stddev = distribution(model).distribution.stddev
+    assert stddev.min() >= MIN_STD
+    assert torch.unique(stddev[:, 0]).numel() == 4
+    model.save(tmp_path / "model.zip")
+    model.policy.save(tmp_path / "policy.pt")
+    for kept in (
+        PPO.load(tmp_path / "model.zip").policy,
+        BoundedPolicy.load(tmp_path / "policy.pt"),
+    ):
+        assert torch.equal(kept.std_net.weight, model.policy.std_net.weight)
+
+
 def test_saved_policy_keeps_its_floor(model, tmp_path):
     model.save(tmp_path / "model.zip")
     assert PPO.load(tmp_path / "model.zip").policy.min_std == MIN_STD
@@ -52,8 +75,9 @@ def test_run_folder_stores_the_policy_class_and_other_classes_reject_min_std(qui
     config = quick_ppo.replace(policy=BOUNDED_POLICY, policy_kwargs={"min_std": MIN_STD})
     folder = train(config, tmp_path, quiet=True).folder
     assert folder.config() == config
-    with pytest.raises(UsageError, match=r"min_std requires policy: .*Bounded"):
-        quick_ppo.replace(policy_kwargs={"min_std": MIN_STD})
+    for name, value in (("min_std", MIN_STD), ("state_dependent_std", True)):
+        with pytest.raises(UsageError, match=rf"{name} requires policy: .*Bounded"):
+            quick_ppo.replace(policy_kwargs={name: value})
 
 
 def test_other_action_bounds_raise():
