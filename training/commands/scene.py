@@ -76,6 +76,8 @@ def run(
     """
     if name not in SCENES:
         raise UsageError(f"unknown scene {name!r}: choose one of {', '.join(SCENES)}")
+    if video is not None:  # before a scene of many bodies is built
+        _check_size(size)
     try:
         check_memory(bodies * _LEAST_BYTES, f"the {bodies} bodies of a scene")
         scene, fidelity = SCENES[name](bodies, seed)
@@ -126,12 +128,17 @@ def _film(world: World, video: Path | None, size: int, fps: float) -> "Film | No
     """The video, whose writers are imported only if one is asked for."""
     if video is None:
         return None
-    from rigid_envs.rendering.pictures import LEAST, MOST
     from training.results.film import Film
+
+    return Film(world, video, fps, size)
+
+
+def _check_size(size: int) -> None:
+    """Raises UsageError for a size that a video can't have."""
+    from rigid_envs.rendering.pictures import LEAST, MOST
 
     if not LEAST <= size <= MOST:
         raise UsageError(f"--size is {size}, should be {LEAST} to {MOST} pixels")
-    return Film(world, video, fps, size)
 
 
 def _show(world: World, steps: int, wall: float, seconds: float) -> None:
