@@ -144,11 +144,6 @@ def read_header(values: Any) -> Header:
         commit=_optional(fields["commit"], lambda value: _text(value, "commit")),
         versions=_mapping(fields["versions"], "versions"),
     )
-    inputs = sum(inputs_of(header, key) for key in observation)
-    if header.network.widths[0] != inputs:
-        raise InvalidHeader(
-            f"network.widths starts with {header.network.widths[0]}, should be {inputs}"
-        )
     points = header.network.keypoints
     if points is not None:
         _one_of(points.key, "network.keypoints.key", tuple(observation))
@@ -156,8 +151,13 @@ def read_header(values: Any) -> Header:
         if len(shape) != 3 or min(map_size(side, points.filters) for side in shape[:2]) < 1:
             raise InvalidHeader(
                 f"observation {points.key!r} has the shape {shape}, should be (height, width, "
-                f"channels) of a picture that network.keypoints.filters leave a part of"
+                "channels) of a picture that is wide enough for network.keypoints.filters"
             )
+    inputs = sum(inputs_of(header, key) for key in observation)
+    if header.network.widths[0] != inputs:
+        raise InvalidHeader(
+            f"network.widths starts with {header.network.widths[0]}, should be {inputs}"
+        )
     if header.normalization is not None:
         for key in header.normalization.keys:
             _one_of(key, "normalization.keys", tuple(observation))

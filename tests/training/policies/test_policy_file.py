@@ -37,6 +37,11 @@ from training.settings.errors import UsageError
 KEYS = ("observation", "achieved_goal", "desired_goal")
 
 
+def points(filters: list[list[int]], key: str = "observation") -> dict:
+    """Keypoints of a header."""
+    return {"key": key, "filters": filters}
+
+
 def observations(count: int = 200, scale: float = 2.0) -> dict[str, np.ndarray]:
     random = np.random.default_rng(0)
     return {key: random.normal(0, scale, (count, 2)).astype(np.float32) for key in KEYS}
@@ -214,7 +219,13 @@ JSON = st.recursive(
 )
 FIELDS = ["algorithm", "environment", "observation", "network", "normalization", "success", "seed"]
 FIELDS += ["steps", "commit", "versions", "environment__id", "network__widths", "network__low"]
-FIELDS += ["network__activation", "network__features", "normalization__keys", "normalization__clip"]
+FIELDS += [
+    "network__activation",
+    "network__features",
+    "network__keypoints",
+    "normalization__keys",
+    "normalization__clip",
+]
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -236,6 +247,10 @@ def test_arbitrary_header_raises_or_acts(saved, tmp_path, field, value):
             {"network__features": "symlog", "network__widths": [6, 2]},
             "features is 'symlog', should be 'linear'",
         ),
+        ({"network__keypoints": points([[3, 1]])}, r"filters is \[\[3, 1\]\], should be a list"),
+        ({"network__keypoints": points([])}, r"filters is \[\], should be a list of \[outputs"),
+        ({"network__keypoints": points([[3, 1, 1]])}, r"\(2,\), should be \(height, width, chan"),
+        ({"network__keypoints": points([[3, 1, 1]], "state")}, "keypoints.key is 'state', should"),
         ({"network__squashing": "sine"}, "squashing is 'sine', should be clip or softsign"),
         ({"algorithm": "sac"}, "squashing is 'clip', should be tanh"),
         (
