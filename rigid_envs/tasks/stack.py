@@ -31,7 +31,7 @@ HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 # dense reward: weights of the terms of the next cube within `stage`
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
 RETREAT_WEIGHT = 0.3
-RETREAT = 0.1  # m above the top cube at which `retreat` is 1
+RETREAT = 0.1  # m above the place of the top cube at which `retreat` is 1
 DECAY_LENGTH = 0.15  # m of path after which `reach` and `place` fall to 1/e
 # Paths lead over other cubes, at the height of their end plus PASS_HEIGHT (m). The extra height
 # falls to 0 while the horizontal distance to the end falls from HALF + DESCENT to HALF (m). Rising
@@ -272,6 +272,7 @@ class Stack(Task):
 
         `placed` is the number of cubes that stand in the tower and are not held. The four terms of
         the next cube lie within 0 and 1. `stage` combines all of them in one number from 0 to 1.
+        `retreat` rises with the hand above a finished tower, from 0 to 1.
         """
         n, hand = self.blocks, self.hand.position(now)
         cube = self._next_cube(world, now, achieved, desired)
@@ -286,10 +287,11 @@ class Stack(Task):
             "grasp": np.where(at_goal | cube.held, 1.0, around * np.minimum(1.0 - opened, 0.5)),
             "place": proximity(path_length(cube.position, cube.goal)),
             # rises as soon as the action asks for a weaker grip, before the fingers move; a grip
-            # that still holds earns less than half of it
+            # that still holds a cube of 4 cm earns less than half of it
             "release": at_goal * opened,
         }
-        # where all are placed, the last is the next: fingers that are open stay clear of it
+        # `release` is kept where all are placed, so that opening the fingers still pays: they are
+        # then clear of the tower
         terms = {
             name: term if name == "release" else np.where(all_placed, 1.0, term)
             for name, term in terms.items()

@@ -93,12 +93,13 @@ class RuleWrapper:
         return np.clip(np.asarray(actions, dtype=np.float64), space.low, space.high)
 
     def _check_action_space(self, space: Any) -> None:
-        if self.rule.needs_action and not isinstance(space, spaces.Box):
+        if not self.rule.needs_action:
+            return
+        if not isinstance(space, spaces.Box):
             raise TypeError(
                 f"{type(self).__name__} wraps environments whose action space is a Box, got {space}"
             )
-        if self.rule.needs_action:
-            self.rule.check_actions(space.shape[-1] if space.shape else 1)
+        self.rule.check_actions(space.shape[-1] if space.shape else 1)
 
     def _check_was_reset(self) -> None:
         if not self._was_reset:

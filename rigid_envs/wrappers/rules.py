@@ -1,6 +1,5 @@
 """Rules with short formulas: penalties on actions and time, a bonus, scaling and bounding."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,11 +25,11 @@ class ActionPenalty(Rule):
     Args:
         weight: at least 0.
         components: of the action, counted from 0, that `|a|^2` sums over; None for all. Leave out
-            components whose 0 is a value like others, as the grip of Stack's hand.
+            components for which 0 does not mean rest, such as the grip of Stack's hand.
     """
 
     weight: float
-    components: Sequence[int] | None = None
+    components: list[int] | tuple[int, ...] | None = None
 
     needs_action = True
     stored_terms = ("action_square",)
@@ -44,7 +43,7 @@ class ActionPenalty(Rule):
             chosen = [integer(f"components[{i}]", x, low=0) for i, x in enumerate(given)]
             if not chosen or len(set(chosen)) < len(chosen):
                 raise ValueError(f"components must name at least one, and none twice, got {given}")
-            object.__setattr__(self, "components", chosen)
+            object.__setattr__(self, "components", tuple(chosen))
 
     def check_actions(self, size: int) -> None:
         """Raises ValueError if actions have no such components."""
@@ -55,8 +54,10 @@ class ActionPenalty(Rule):
 
     def step_terms(self, memory: Any, step: Transition) -> Terms:
         """`|a|^2`."""
-        action = step.action if self.components is None else step.action[..., self.components]
-        return {"action_square": np.sum(action**2, axis=-1)}
+        square = step.action**2
+        if self.components is not None:
+            square = square[..., list(self.components)]
+        return {"action_square": np.sum(square, axis=-1)}
 
     def apply(self, reward: Array, goals: Goals, terms: Terms) -> tuple[Array, Terms]:
         """See the class."""

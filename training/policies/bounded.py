@@ -11,7 +11,8 @@ from stable_baselines3.common.type_aliases import Schedule
 from training.settings.errors import UsageError
 
 LOG_STD_RANGE = (-6.0, 0.5)
-"""Bounds of the logarithm of a standard deviation that depends on the state."""
+"""Bounds of the logarithm of a standard deviation that depends on the state, before `min_std` is
+added. There is no gradient beyond them."""
 
 
 class BoundedPolicy(MultiInputActorCriticPolicy):
@@ -30,11 +31,12 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     Args:
         *args: As for Stable-Baselines3's policy.
         min_std: Standard deviation that is added to the learned one.
-        state_dependent_std: Whether the standard deviation depends on the observation.
+        state_dependent_std: Whether the standard deviation depends on the observation; its
+            logarithm then stays within `LOG_STD_RANGE`.
         **kwargs: As for Stable-Baselines3's policy.
 
     Raises:
-        UsageError: The bounds of the action are not ±1.
+        UsageError: The bounds of the action are not ±1, or `log_std_init` is outside of the range.
     """
 
     action_net: torch.nn.Linear
@@ -49,6 +51,12 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
         low, high = getattr(self.action_space, "low", 0.0), getattr(self.action_space, "high", 0.0)
         if not (np.all(low == -1.0) and np.all(high == 1.0)):
             raise UsageError(f"BoundedPolicy requires actions within ±1, not {self.action_space}")
+        least, most = LOG_STD_RANGE
+        if state_dependent_std and not least < self.log_std_init < most:
+            raise UsageError(
+                f"log_std_init is {self.log_std_init}, should be above {least} and below {most} "
+                "with state_dependent_std"
+            )
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {
@@ -63,7 +71,7 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
             layer = torch.nn.Linear(self.mlp_extractor.latent_dim_pi, self.action_net.out_features)
             torch.nn.init.zeros_(layer.weight)
             torch.nn.init.zeros_(layer.bias)
-            self.std_net = layer
+            self.std_net = layer  # its bias and `log_std` both set what all states have in common
             self.optimizer.add_param_group({"params": list(layer.parameters())})
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:

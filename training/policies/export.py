@@ -166,8 +166,13 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
     kinds = {type(module) for module in between}
     own = isinstance(extractor, GoalOffsets | SymlogOffsets | KeypointFeatures)
     flat = own or all(isinstance(x, torch.nn.Flatten) for x in extractor.extractors.values())
+    if not flat:
+        raise UsageError(
+            f"policy files cannot hold the features of a {type(extractor).__name__}; to act from "
+            "pixels, use policy: training.policies.pixels.PixelPolicy"
+        )
     alternate = len(modules) == 2 * len(between) + 1
-    if not flat or not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
+    if not alternate or len(kinds) > 1 or not kinds <= ACTIVATIONS.keys():
         raise UsageError(
             f"policy files support linear layers with tanh, relu or elu, not {modules}"
         )

@@ -1,8 +1,8 @@
 """Keypoints of pictures in NumPy: where in a picture each of a network's maps is high.
 
 Convolutions without padding, with ReLU between them, make maps of a picture. The softmax over the
-cells of a map is a distribution; its mean is the map's keypoint (x, y), from -1 to 1 over the map.
-This is the spatial soft-argmax of Levine et al., End-to-end training of deep visuomotor policies
+cells of a map is a distribution; its mean is the map's keypoint (x, y), from -1 to 1 over the map,
+x to the right and y upwards. This is the spatial soft-argmax of Levine et al., End-to-end training of deep visuomotor policies
 (2016). `pixels` has the same in torch, for training.
 """
 
@@ -15,8 +15,8 @@ Array = np.ndarray
 Filter = tuple[Array, Array]
 """Weights (outputs, inputs, k, k) and biases (outputs,)."""
 
-CHUNK = 64
-"""Pictures that are computed together, so that their windows fit into the cache."""
+CHUNK_BYTES = 2**21
+"""Size of the windows of the pictures that are computed together: they fit into the cache."""
 
 
 def map_size(size: int, filters: Sequence[Sequence[int]]) -> int:
@@ -46,9 +46,15 @@ def keypoints(pictures: Array, filters: Sequence[Filter], strides: Sequence[int]
         filters: The convolutions in order; the outputs of the last are the maps.
         strides: Of each convolution.
     """
+    largest, (height, width) = 1, pictures.shape[1:3]
+    for (weights, _), stride in zip(filters, strides, strict=True):
+        kernel = weights.shape[-1]
+        height, width = ((size - kernel) // stride + 1 for size in (height, width))
+        largest = max(largest, 8 * height * width * weights[0].size)
+    chunk = max(1, CHUNK_BYTES // largest)
     parts = [
-        _keypoints(pictures[first : first + CHUNK], filters, strides)
-        for first in range(0, len(pictures), CHUNK)
+        _keypoints(pictures[first : first + chunk], filters, strides)
+        for first in range(0, len(pictures), chunk)
     ]
     return np.concatenate(parts) if parts else np.zeros((0, 2 * len(filters[-1][0])))
 

@@ -22,8 +22,7 @@ SHARPNESS = 10.0
 """Factor of the maps. With 1, a new network's softmax is so even that all keypoints lie in the
 middle of every picture, and nothing is learned from them."""
 KEYPOINT_SCALE, GOAL_SCALE = 4.0, 10.0
-"""Factors that bring keypoints and goals, in m, to values of about one: a table of half a metre
-fills a picture."""
+"""Factors of keypoints, which are within ±1, and of goals in m: the usual values are about one."""
 
 
 class KeypointFeatures(BaseFeaturesExtractor):
@@ -59,6 +58,11 @@ class KeypointFeatures(BaseFeaturesExtractor):
         assert picture.shape is not None
         assert goal.shape is not None
         channels, height, width = picture.shape
+        if channels >= min(height, width):  # Stable-Baselines3 takes the least for the channels
+            raise UsageError(
+                f"the picture has the shape {picture.shape}, should have fewer channels than rows "
+                "and columns: a larger pixel_size, or a smaller frame_stack"
+            )
         chain = (*filters, (keypoints, 1, 1))
         size = [map_size(side, chain) for side in (height, width)]
         if min(size) < 1:

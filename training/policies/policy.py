@@ -16,7 +16,7 @@ class Policy:
     """A function from observations to actions, and the environment that it is for."""
 
     act: Controller
-    """Takes observations, a dict of (n, k) arrays; returns actions (n, action_dim)."""
+    """Takes observations, a dict of (n, ...) arrays; returns actions (n, action_dim)."""
     env_id: str
     """Environment id."""
     name: str

@@ -81,7 +81,7 @@ class PolicyFile:
             (n, action_dim) float32 within the bounds of the action.
 
         Raises:
-            UsageError: The keys or shapes differ from those that the policy was trained on.
+            UsageError: A key is missing, or a shape differs from that of training.
         """
         header = self.header
         read = {
@@ -100,20 +100,20 @@ class PolicyFile:
                 f"environment has {given}; does it have the same arguments as in training?"
             )
         points, parts = header.network.keypoints, []
-        for key in header.observation:  # in the order of the network's inputs
-            value = read[key]
-            if header.normalization is not None and key in self.mean:
-                scale = np.sqrt(self.variance[key] + header.normalization.epsilon)
-                clip = header.normalization.clip
-                value = np.clip((value - self.mean[key]) / scale, -clip, clip)
-            if points is not None and key == points.key:
-                value = keypoints(value, self.filters, [one[-1] for one in points.filters])
-            parts.append(value.astype(np.float32).reshape(len(value), -1))
-        x = np.concatenate(parts, axis=1).astype(np.float64)
         names = [header.network.activation] * len(self.layers)
         if header.network.features != "linear":
             names[0] = header.network.features
         with _BLAS.limit(limits=1, user_api="blas"):
+            for key in header.observation:  # in the order of the network's inputs
+                value = read[key]
+                if header.normalization is not None and key in self.mean:
+                    scale = np.sqrt(self.variance[key] + header.normalization.epsilon)
+                    clip = header.normalization.clip
+                    value = np.clip((value - self.mean[key]) / scale, -clip, clip)
+                if points is not None and key == points.key:
+                    value = keypoints(value, self.filters, [one[-1] for one in points.filters])
+                parts.append(value.astype(np.float32).reshape(len(value), -1))
+            x = np.concatenate(parts, axis=1).astype(np.float64)
             for number, (weights, biases) in enumerate(self.layers):
                 if number:
                     x = ACTIVATIONS[names[number - 1]](x)

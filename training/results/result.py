@@ -34,7 +34,7 @@ from training.settings.settings import (
 RESULT = "result.json"
 SAME_TASK = (
     "reward_type", "fidelity", "observe_task_guide",
-    "pixels", "pixel_size", "frame_stack", "camera",
+    "pixel_size", "camera",
 )  # fmt: skip
 """Arguments of the environment that do not change the task to be solved."""
 

@@ -13,6 +13,7 @@ import yaml
 
 from training.settings.errors import UsageError, nearest
 from training.settings.settings import (
+    MOST_FILTERS,
     InvalidValue,
     boolean,
     choice,
@@ -53,8 +54,8 @@ NETWORK_RULES = {
     "state_dependent_std": boolean,
 }
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
-"""Further ones, of the symlog policies alone."""
-PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1)}
+"""Further ones, of policies with features on a logarithmic scale, in actor or critic."""
+PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
 """Further ones, of policies that act from pixels."""
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
 """Arguments of VecNormalize that say what is scaled, both true by default."""
@@ -67,7 +68,7 @@ class TrainConfig:
     algo: ClassVar[str]
     """Name of the algorithm, as in configs/<algo>.yaml."""
     symlog_policies: ClassVar[tuple[str, ...]] = ()
-    """Import paths of the algorithm's symlog policies."""
+    """Import paths of the algorithm's policies with features on a logarithmic scale."""
     pixel_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those of the algorithm's policies that act from pixels."""
 
@@ -211,7 +212,7 @@ class TrainConfig:
         ):
             for name in rules:
                 if name in self.policy_kwargs and self.policy not in policies:
-                    required = f"policy: {' or '.join(policies)}" if policies else "PPO"
+                    required = f"policy: {' or '.join(policies)}" if policies else "algorithm ppo"
                     raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
         if self.norm_obs and symlog:
             only_rewards = " or {norm_obs: false}" if self.algo == "ppo" else ""

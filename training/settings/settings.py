@@ -23,13 +23,18 @@ def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"rule": rule})
 
 
-def integer(at_least: int) -> Rule:
-    """An integer of at least `at_least`; 1e6, which YAML parses as a float, is accepted."""
+MOST_FILTERS = 1024
+"""Largest number of maps, width and stride of a convolution: more than two cores can train."""
+
+
+def integer(at_least: int, at_most: float = math.inf) -> Rule:
+    """An integer within bounds; 1e6, which YAML parses as a float, is accepted."""
+    limit = "" if at_most == math.inf else f" and at most {at_most}"
 
     def check(value: Any) -> int:
         whole = _is_number(value) and float(value).is_integer()
-        if not whole or value < at_least:
-            raise InvalidValue(f"an integer of at least {at_least}")
+        if not whole or not at_least <= value <= at_most:
+            raise InvalidValue(f"an integer of at least {at_least}{limit}")
         return int(value)
 
     return check
@@ -184,9 +189,10 @@ def filter_list(value: Any) -> list[list[int]]:
         ]
     except InvalidValue:
         filters = [[]]
-    if any(len(one) != 3 for one in filters):
+    if any(len(one) != 3 or max(one) > MOST_FILTERS for one in filters):
         raise InvalidValue(
-            "a list of [outputs, kernel width, stride] of convolutions, as in [[16, 5, 3]]"
+            "a list of [outputs, kernel width, stride] of convolutions, as in [[16, 5, 3]], up to "
+            f"{MOST_FILTERS} each"
         )
     return filters
 

@@ -173,6 +173,7 @@ def test_a_tower_is_solved_only_when_let_go():
     assert not info["is_success"]
     weak = env.step(np.array([0.0, 0.0, 0.0, -0.5]))[4]
     assert weak["release"] == pytest.approx(0.25)
+    assert weak["retreat"] == 0.0
     assert not weak["is_success"]
     assert observation["achieved_goal"][-1] == 0.0
     for _ in range(5):
@@ -181,6 +182,15 @@ def test_a_tower_is_solved_only_when_let_go():
     assert (info["placed"], info["release"]) == (2.0, 1.0)
     assert reward == pytest.approx(2.0)
     assert gripped < reward
+    for _ in range(3):
+        observation, reward, _, _, info = env.step(np.array([0.0, 0.0, 0.5, 1.0]))
+    risen = observation["observation"][2] - observation["desired_goal"][5]
+    assert 0.03 < risen < 0.09
+    assert info["retreat"] == pytest.approx(risen / 0.1, rel=1e-3)
+    assert reward == pytest.approx(2.0 + 0.3 * info["retreat"])
+    half_open = env.step(np.zeros(4))[4]
+    assert half_open["placed"] == 2.0
+    assert half_open["stage"] == pytest.approx(1.0 - 0.5 * 0.35 * 0.5)
 
 
 def test_stage_never_falls_by_much_while_a_controller_stacks():

@@ -135,7 +135,7 @@ def test_a_penalty_counts_the_chosen_components_of_the_action():
     reward, info = wrapped.step(action)[1::3]
     assert info["action_square"] == 0.5**2 + 1.0
     assert reward == plain.step(action)[1] - 0.5 * 1.25
-    assert gym.make(wrapped.spec).rule.components == [0, 2]
+    assert gym.make(wrapped.spec).rule.components == (0, 2)
 
 
 def test_a_stage_pays_nothing_before_all_stages_before_it_are_complete():

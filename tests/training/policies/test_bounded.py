@@ -66,6 +66,14 @@ def test_standard_deviation_can_depend_on_the_state(tmp_path):
         assert torch.equal(kept.std_net.weight, model.policy.std_net.weight)
 
 
+def test_a_deviation_that_could_not_be_learned_raises():
+    kwargs = {"log_std_init": 1.0, "state_dependent_std": True}
+    with pytest.raises(
+        UsageError, match=r"log_std_init is 1.0, should be above -6.0 and below 0.5"
+    ):
+        PPO(BoundedPolicy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
+
+
 def test_saved_policy_keeps_its_floor(model, tmp_path):
     model.save(tmp_path / "model.zip")
     assert PPO.load(tmp_path / "model.zip").policy.min_std == MIN_STD

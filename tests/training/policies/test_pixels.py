@@ -138,5 +138,14 @@ def test_wrong_settings_name_what_is_required():
         KeypointFeatures(spaces.Dict({"observation": box, **goals}))
     with pytest.raises(UsageError, match="too much for pictures of 20 x 20 pixels"):
         KeypointFeatures(spaces.Dict({"observation": picture, **goals}), [[4, 21, 1]])
+    deep = spaces.Box(0, 255, (24, 20, 24), np.uint8)
+    with pytest.raises(UsageError, match="should have fewer channels than rows and columns"):
+        KeypointFeatures(spaces.Dict({"observation": deep, **goals}))
+    with pytest.raises(UsageError, match="keypoints is an integer of at least 1 and at most 1024"):
+        config(policy_kwargs={"keypoints": 1025})
+    pictures = {**PICTURES, "pixel_size": 36}
+    plain = config(policy="MultiInputPolicy", policy_kwargs={}, env_kwargs=pictures)
+    with pytest.raises(UsageError, match=r"features of a CombinedExtractor; to act from pixels"):
+        train(plain)
     with pytest.raises(UsageError, match=r"critic requires obs_type=.pixels\+state"):
         StateFeatures(spaces.Dict({"observation": picture, **goals}))
