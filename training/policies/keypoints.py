@@ -2,8 +2,8 @@
 
 Convolutions without padding, with ReLU between them, make maps of a picture. The softmax over the
 cells of a map is a distribution; its mean is the map's keypoint (x, y), from -1 to 1 over the map,
-x to the right and y upwards. This is the spatial soft-argmax of Levine et al., End-to-end training of deep visuomotor policies
-(2016). `pixels` has the same in torch, for training.
+x to the right and y upwards. This is the spatial soft-argmax of Levine et al., End-to-end training
+of deep visuomotor policies (2016). `pixels` has the same in torch, for training.
 """
 
 from collections.abc import Sequence
