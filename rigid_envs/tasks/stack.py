@@ -30,7 +30,7 @@ HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 
 # dense reward: weights of the terms of the next cube within `stage`
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
-RETREAT_WEIGHT = 0.3
+RETREAT_WEIGHT, PRECISION_WEIGHT = 0.3, 0.5
 RETREAT = 0.1  # m above the place of the top cube at which `retreat` is 1
 DECAY_LENGTH = 0.15  # m of path after which `reach` and `place` fall to 1/e
 # Paths lead over other cubes, at the height of their end plus PASS_HEIGHT (m). The extra height
@@ -48,12 +48,14 @@ class NextCube(NamedTuple):
         position: [count, 3] m, where the cube is.
         goal: [count, 3] m, where it belongs.
         held: [count] whether both fingers press on it from its sides.
+        distance: [count] m, the largest distance of any cube from its goal.
     """
 
     placed: Array
     position: Array
     goal: Array
     held: Array
+    distance: Array
 
 
 class Stack(Task):
@@ -111,7 +113,12 @@ class Stack(Task):
         # cells, offsets within the cells, and five numbers for the easier starts
         self.draw_count = len(CELL_CENTERS) + 2 * (self.blocks + 1) + 5
         self._grasps: dict[Fidelity, tuple[Array, Array]] = {}
-        weights = {"success": 1.0, "stage": 1.0, "retreat": RETREAT_WEIGHT}
+        weights = {
+            "success": 1.0,
+            "stage": 1.0,
+            "retreat": RETREAT_WEIGHT,
+            "precision": PRECISION_WEIGHT,
+        }
         self.reward = Reward(THRESHOLD, weights, time_penalty=2.0)
 
     def scene(self) -> Scene:
@@ -268,11 +275,12 @@ class Stack(Task):
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`placed`; `reach`, `grasp`, `place` and `release` of the next cube; `stage`; `retreat`.
+        """`placed`; the next cube's `reach`, `grasp`, `place`, `release`; three of the tower.
 
         `placed` is the number of cubes that stand in the tower and are not held. The four terms of
         the next cube lie within 0 and 1. `stage` combines all of them in one number from 0 to 1.
-        `retreat` rises with the hand above a finished tower, from 0 to 1.
+        `retreat` rises with the hand above a finished tower, and `precision` is higher the nearer
+        its cubes are to their places, both from 0 to 1.
         """
         n, hand = self.blocks, self.hand.position(now)
         cube = self._next_cube(world, now, achieved, desired)
@@ -303,6 +311,7 @@ class Stack(Task):
             **terms,
             "stage": (np.minimum(cube.placed, n - 1) + stage) / n,
             "retreat": all_placed * np.clip(above / RETREAT, 0.0, 1.0),
+            "precision": all_placed * np.maximum(1.0 - cube.distance / THRESHOLD, 0.0),
         }
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
@@ -321,9 +330,8 @@ class Stack(Task):
         n = self.blocks
         # [blocks, 3, count]: NumPy is faster where the worlds come last, as in a readout
         cubes, places = (goals[:, :-1].T.reshape(n, 3, -1) for goals in (achieved, desired))
-        at_goal = np.array(
-            [distance(a.T, b.T) <= THRESHOLD for a, b in zip(cubes, places, strict=True)]
-        )
+        distances = np.array([distance(a.T, b.T) for a, b in zip(cubes, places, strict=True)])
+        at_goal = distances <= THRESHOLD
         # fingers that press on a cube from above do not hold it: closed fingers, or fingers around
         # a cube that stands on it
         same_height = np.abs(cubes[:, 2] - self.hand.position(now)[:, 2]) < HALF
@@ -340,7 +348,7 @@ class Stack(Task):
             return chosen
 
         position, goal = (of_next(points).T.astype(float) for points in (cubes, places))
-        return NextCube(placed, position, goal, of_next(held))
+        return NextCube(placed, position, goal, of_next(held), distances.max(axis=0))
 
     def _finger_forces(self, world: World) -> Array:
         """Normal forces [blocks, 2, count] in N between each cube and each finger."""

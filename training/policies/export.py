@@ -26,7 +26,7 @@ from training.policies.policy_header import (
     Normalization,
     Success,
 )
-from training.policies.symlog import SymlogOffsets
+from training.policies.symlog_features import SymlogOffsets
 from training.runs.run_folder import RunFolder, atomic_write, git_commit, package_versions
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError

@@ -10,7 +10,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtr
 from torch import nn
 
 from training.policies.keypoints import cell_centers, map_size
-from training.policies.symlog import SymlogOffsets
+from training.policies.symlog_features import SymlogOffsets
 from training.settings.config import PIXEL_RULES, SYMLOG_RULES
 from training.settings.errors import UsageError
 

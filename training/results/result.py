@@ -100,8 +100,15 @@ class Result:
 
     @property
     def title(self) -> str:
-        """Task and algorithm for readers, as RigidEnvs/Push-v0 with randomize, PPO."""
-        changed = changed_arguments(self.env_id, self.arguments)
+        """Task and algorithm for readers, as RigidEnvs/Stack-v0 with blocks=3, PPO.
+
+        A value is shown if it is a number or a text.
+        """
+        changed = []
+        for name in changed_arguments(self.env_id, self.arguments):
+            value = self.arguments[name]
+            shown = isinstance(value, (int, float, str)) and value is not True
+            changed.append(f"{name}={value}" if shown else name)
         task = " with ".join([plain_id(self.env_id), *([", ".join(changed)] if changed else [])])
         return f"{task}, {self.algorithm.upper()}"
 

@@ -41,6 +41,7 @@ class PPOConfig(TrainConfig):
 
     algo: ClassVar[str] = "ppo"
     symlog_policies: ClassVar[tuple[str, ...]] = (*SYMLOG_PPO_POLICIES, PIXEL_POLICY)
+    mirrored_policies: ClassVar[tuple[str, ...]] = SYMLOG_PPO_POLICIES
     pixel_policies: ClassVar[tuple[str, ...]] = (PIXEL_POLICY,)
 
     policy: str = setting(choice(*PPO_POLICIES), "MultiInputPolicy")

@@ -23,6 +23,7 @@ from training.settings.settings import (
     integer,
     layer_widths,
     mapping,
+    mirror_list,
     number,
     optional,
     positive_numbers,
@@ -55,8 +56,11 @@ NETWORK_RULES = {
 }
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
 """Further ones, of policies with features on a logarithmic scale, in actor or critic."""
+MIRROR_RULES = {"mirrors": mirror_list}
+"""Further ones, of policies that act in a mirrored state as the mirror shows."""
 PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
 """Further ones, of policies that act from pixels."""
+POLICY_RULES = NETWORK_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
 """Arguments of VecNormalize that say what is scaled, both true by default."""
 
@@ -69,6 +73,8 @@ class TrainConfig:
     """Name of the algorithm, as in configs/<algo>.yaml."""
     symlog_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of the algorithm's policies with features on a logarithmic scale."""
+    mirrored_policies: ClassVar[tuple[str, ...]] = ()
+    """Import paths of those whose networks can be equivariant under reflections."""
     pixel_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those of the algorithm's policies that act from pixels."""
 
@@ -107,11 +113,11 @@ class TrainConfig:
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3 for dict observations."""
-    policy_kwargs: dict[str, Any] = setting(mapping(NETWORK_RULES | SYMLOG_RULES | PIXEL_RULES), {})
+    policy_kwargs: dict[str, Any] = setting(mapping(POLICY_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
     relu for SAC, as in Stable-Baselines3); min_std and state_dependent_std (bounded policies only);
-    differences, components and units (symlog policies and PixelPolicy only); filters and keypoints
-    (PixelPolicy only)."""
+    differences, components and units (symlog policies and PixelPolicy only); mirrors (symlog
+    policies of PPO only); filters and keypoints (PixelPolicy only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)
@@ -208,6 +214,7 @@ class TrainConfig:
         symlog = self.policy in self.symlog_policies
         for rules, policies in (
             (SYMLOG_RULES, self.symlog_policies),
+            (MIRROR_RULES, self.mirrored_policies),
             (PIXEL_RULES, self.pixel_policies),
         ):
             for name in rules:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -23,6 +24,8 @@ def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"rule": rule})
 
 
+SLICE = re.compile(r"-?\d*:-?\d*(:[1-9]\d*)?")
+"""A slice of indices: start, stop and step, each of which may be missing, as in "0:-1:3"."""
 MOST_FILTERS = 1024
 """Largest number of maps, width and stride of a convolution: more than two cores can train."""
 
@@ -163,22 +166,36 @@ def true_false_or(keys: Mapping[str, Rule]) -> Rule:
     return check
 
 
-def indices(value: Any) -> list[int]:
-    """Indices, as in [0, 1, -1]; those below 0 count from the end."""
-    if not isinstance(value, list) or any(type(index) is not int for index in value):
-        raise InvalidValue("a list of indices, as in [0, 1, -1]")
+def indices(value: Any) -> list[int | str]:
+    """Indices or slices, as in [0, 1, -1, "3:9:2"]; numbers below 0 count from the end."""
+    if not isinstance(value, list) or not all(
+        type(entry) is int or (isinstance(entry, str) and SLICE.fullmatch(entry)) for entry in value
+    ):
+        raise InvalidValue('a list of indices, as in [0, 1, -1], or slices, as in ["3:9:2"]')
     return value
 
 
 def index_pairs(value: Any) -> list[list[int]]:
     """Pairs of indices, as in [[8, 0], [9, 1]]."""
-    try:
-        pairs = [indices(pair) for pair in _check_type(list, value)]
-    except InvalidValue:
-        pairs = [[]]
-    if any(len(pair) != 2 for pair in pairs):
+    pairs = value if isinstance(value, list) else [[]]
+    if not all(
+        isinstance(pair, list) and len(pair) == 2 and all(type(one) is int for one in pair)
+        for pair in pairs
+    ):
         raise InvalidValue("a list of pairs of indices, as in [[8, 0], [9, 1]]")
     return pairs
+
+
+def mirror_list(value: Any) -> list[dict[str, list[int]]]:
+    """Reflections: the components that change sign, as in [{observation: [0, 3], actions: [0]}]."""
+    one = mapping(dict.fromkeys(("observation", "goal", "actions"), indices))
+    try:
+        return [one(mirror) for mirror in _check_type(list, value)]
+    except InvalidValue as error:
+        raise InvalidValue(
+            "a list of the components that change sign in each mirror, as in "
+            f"[{{observation: [0, 3], goal: [0], actions: [0]}}]: {error}"
+        ) from None
 
 
 def filter_list(value: Any) -> list[list[int]]:

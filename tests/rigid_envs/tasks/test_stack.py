@@ -173,24 +173,38 @@ def test_a_tower_is_solved_only_when_let_go():
     assert not info["is_success"]
     weak = env.step(np.array([0.0, 0.0, 0.0, -0.5]))[4]
     assert weak["release"] == pytest.approx(0.25)
-    assert weak["retreat"] == 0.0
+    assert weak["retreat"] == weak["precision"] == 0.0
     assert not weak["is_success"]
     assert observation["achieved_goal"][-1] == 0.0
     for _ in range(5):
         observation, reward, _, _, info = env.step(release)
     assert info["is_success"]
     assert (info["placed"], info["release"]) == (2.0, 1.0)
-    assert reward == pytest.approx(2.0)
+    assert info["precision"] > 0.8  # the cubes were put at their places
+    assert reward == pytest.approx(2.0 + 0.5 * info["precision"])
     assert gripped < reward
     for _ in range(3):
         observation, reward, _, _, info = env.step(np.array([0.0, 0.0, 0.5, 1.0]))
     risen = observation["observation"][2] - observation["desired_goal"][5]
     assert 0.03 < risen < 0.09
     assert info["retreat"] == pytest.approx(risen / 0.1, rel=1e-3)
-    assert reward == pytest.approx(2.0 + 0.3 * info["retreat"])
+    assert reward == pytest.approx(2.0 + 0.3 * info["retreat"] + 0.5 * info["precision"])
     half_open = env.step(np.zeros(4))[4]
     assert half_open["placed"] == 2.0
     assert half_open["stage"] == pytest.approx(1.0 - 0.5 * 0.35 * 0.5)
+
+
+@pytest.mark.parametrize("leaning", [0, 1])
+def test_precision_falls_with_the_largest_distance_of_a_cube_from_its_place(leaning):
+    env = make(STACK, reward_type="dense")
+    env.reset(seed=0)
+    tower = cubes_of(env._runner.goals).astype(float)
+    tower[0, leaning, 0] += 0.005
+    env._runner.world.set_state(position=tower, drive_position=[[[0, -0.04, 0.3], [0, 0.04, 0.3]]])
+    env._runner._now = env._runner.world.read()
+    info = env.step(np.array([0.0, 0.0, 0.0, 1.0]))[4]
+    assert info["is_success"]
+    assert info["precision"] == pytest.approx(1.0 - 0.005 / 0.02, abs=0.02)
 
 
 def test_stage_never_falls_by_much_while_a_controller_stacks():

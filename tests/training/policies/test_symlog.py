@@ -9,12 +9,11 @@ from stable_baselines3 import PPO, SAC
 from tests.training.reach import ReachVectorEnv
 from training.policies.policy_file import load_policy_file
 from training.policies.symlog import (
-    UNITS,
     BoundedSymlogPolicy,
     SymlogActorCriticPolicy,
-    SymlogOffsets,
     SymlogPolicy,
 )
+from training.policies.symlog_features import UNITS, SymlogOffsets
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv
@@ -92,9 +91,9 @@ def test_wrong_spaces_components_and_algorithms_raise(quick_ppo, quick_sac):
     goals = spaces.Dict(dict.fromkeys(("observation", "achieved_goal", "desired_goal"), box))
     with pytest.raises(UsageError, match="require observations with goals, not Dict"):
         SymlogOffsets(spaces.Dict({"observation": box}))
-    with pytest.raises(UsageError, match=r"differences is \[\[0, 3\]\], should .* -3 to 2"):
+    with pytest.raises(UsageError, match=r"differences: 3 in \[0, 3\], should .* -3 to 2"):
         SymlogOffsets(goals, [[0, 3]])
-    with pytest.raises(UsageError, match=r"components is \[3\], should have .* -3 to 2"):
+    with pytest.raises(UsageError, match=r"components: 3 in \[3\], should be .* -3 to 2"):
         SymlogOffsets(goals, components=[3])
     with pytest.raises(UsageError, match=r"policy is 'training.policies.symlog.SymlogPolicy'"):
         quick_ppo.replace(policy=SYMLOG_POLICY)
