@@ -1,7 +1,7 @@
 """Networks that act in the mirror image of a state as the mirror shows it.
 
-A task that looks the same in a mirror does not have to be learned on both sides of it. Each
-reflection changes the sign of some components of the observation and of the action. The network is
+A task that looks the same in a mirror does not have to be learned on both sides of it. In each
+mirror some components of observation and action change their sign or place. The network is
 equivariant: where it answers the observation s with the mean action a, it answers the mirror image
 of s with that of a, and both states have the same value.
 
@@ -15,8 +15,6 @@ Pol et al., MDP homomorphic networks, 2020).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import torch
@@ -24,55 +22,21 @@ from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import Schedule
 
-from training.policies.symlog_features import SymlogOffsets, component_indices
-from training.settings.errors import UsageError
-
-
-@dataclass(frozen=True)
-class Images:
-    """How the mirror images of n values follow from them, for each of k combinations.
-
-    The image of x has components sign[c, i] x[source[c, i]].
-
-    Attributes:
-        source: [k, n] indices.
-        sign: [k, n] ±1.
-    """
-
-    source: torch.Tensor
-    sign: torch.Tensor
-
-    @staticmethod
-    def of_signs(signs: torch.Tensor) -> "Images":
-        """Images of values [n] that keep their place; signs [mirrors, n] of each reflection."""
-        mirrors, n = signs.shape
-        rows = [
-            torch.prod(torch.where(torch.tensor(used, dtype=torch.bool)[:, None], signs, 1.0), 0)
-            for used in product((0, 1), repeat=mirrors)
-        ]
-        return Images(torch.arange(n).expand(len(rows), n), torch.stack(rows))
-
-    @staticmethod
-    def of_units(mirrors: int, n: int) -> "Images":
-        """Images of n hidden units in groups of 2^mirrors.
-
-        Raises:
-            UsageError: n is not a multiple of that.
-        """
-        size = 2**mirrors
-        if n % size:
-            raise UsageError(
-                f"net_arch has a layer of {n} units, should have multiples of {size} with "
-                f"{mirrors} mirrors"
-            )
-        unit = torch.arange(n)
-        member, group = unit // (n // size), unit % (n // size)
-        rows = [(member ^ used) * (n // size) + group for used in range(size)]
-        return Images(torch.stack(rows), torch.ones(size, n))
+from training.policies.reflections import (
+    Entry,
+    Images,
+    combinations,
+    reflection,
+    unchanged,
+    unit_images,
+)
+from training.policies.symlog_features import SymlogOffsets
 
 
 class Average:
     """Averages the weights [out, in] or biases [out] of a layer over all mirror images.
+
+    Weights that are images of each other have one average, which is computed once.
 
     Args:
         written: Images of what the layer writes.
@@ -80,15 +44,21 @@ class Average:
     """
 
     def __init__(self, written: Images, read: Images | None = None):
-        self.source, self.sign = written.source, written.sign
+        source, sign = written
         if read is not None:
             width = read.source.shape[1]
-            self.source = self.source[:, :, None] * width + read.source[:, None, :]
-            self.sign = self.sign[:, :, None] * read.sign[:, None, :]
+            source = (source[:, :, None] * width + read.source[:, None, :]).flatten(1)
+            sign = (sign[:, :, None] * read.sign[:, None, :]).flatten(1)
+        first, image = source.min(dim=0)  # of all images of a weight
+        chosen, self.place = torch.unique(first, return_inverse=True)
+        self.place_sign = torch.gather(sign, 0, image[None])[0]
+        self.source, self.sign = source[:, chosen].flatten(), sign[:, chosen]
 
     def __call__(self, values: torch.Tensor) -> torch.Tensor:
         """The average, in the shape of the values."""
-        return (values.flatten()[self.source] * self.sign).mean(0)
+        images = values.flatten().index_select(0, self.source).view_as(self.sign)
+        average = (images * self.sign).mean(dim=0)
+        return (average.index_select(0, self.place) * self.place_sign).view_as(values)
 
 
 class Mirrored:
@@ -96,18 +66,17 @@ class Mirrored:
 
     Args:
         *args: As for the policy.
-        mirrors: For each reflection the components that change sign, by the keys `observation`,
-            `goal` and `actions`, as indices, -1 being the last, or as slices such as "0:-1:3". A
-            missing key stands for none.
+        mirrors: For each mirror what changes, by the keys `observation`, `goal` and `actions`, see
+            `reflection`. A missing key stands for nothing.
         **kwargs: As for the policy.
 
     Raises:
-        UsageError: There is no such component, a difference has only one component that changes
-            sign, or a hidden layer cannot be divided into groups.
+        UsageError: There is no such component, the image of a feature is no feature, the order of
+            two mirrors matters, or a hidden layer cannot be divided into groups.
     """
 
     def __init__(
-        self, *args: Any, mirrors: Sequence[Mapping[str, Sequence[int | str]]] = (), **kwargs: Any
+        self, *args: Any, mirrors: Sequence[Mapping[str, Sequence[Entry]]] = (), **kwargs: Any
     ):
         self.mirrors = mirrors
         super().__init__(*args, **kwargs)
@@ -121,31 +90,32 @@ class Mirrored:
             _tie(self, self.mirrors)  # type: ignore[arg-type]
 
 
-def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[int | str]]]) -> None:
+def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[Entry]]]) -> None:
     """Averages the policy's weights, and from now on their gradients, over all mirror images."""
-    extractor = policy.features_extractor
+    extractor, actions = policy.features_extractor, spaces.flatdim(policy.action_space)
     assert isinstance(extractor, SymlogOffsets)
-    features = [extractor.signs(m.get("observation", ()), m.get("goal", ())) for m in mirrors]
-    size = spaces.flatdim(policy.action_space)
-    actions = torch.ones(len(mirrors), size)
-    for row, mirror in zip(actions, mirrors, strict=True):
-        row[component_indices("mirrors", mirror.get("actions", ()), size, "action")] = -1.0
-    observed, acted = Images.of_signs(torch.stack(features)), Images.of_signs(actions)
-
-    def unchanged(n: int) -> Images:
-        return Images.of_signs(torch.ones(len(mirrors), n))
-
+    features, acts = [], []
+    for mirror in mirrors:
+        seen, goal = (
+            reflection(mirror.get(key, ()), extractor.sizes[vector], vector)
+            for key, vector in (("observation", "observation"), ("goal", "desired_goal"))
+        )
+        features.append(extractor.images(seen, goal))
+        acts.append(reflection(mirror.get("actions", ()), actions, "action"))
+    observed, acted = combinations(features), combinations(acts)
+    swapped = acted._replace(sign=torch.ones_like(acted.sign))  # a deviation has no sign
     networks: list[tuple[Any, list[tuple[Any, Images]]]] = [
         (policy.mlp_extractor.policy_net, [(policy.action_net, acted)]),
         (policy.mlp_extractor.value_net, [(policy.value_net, unchanged(1))]),
     ]
-    if getattr(policy, "state_dependent_std", False):  # a deviation has no sign
-        networks[0][1].append((policy.std_net, unchanged(size)))
+    if getattr(policy, "state_dependent_std", False):
+        networks[0][1].append((policy.std_net, swapped))
+    policy.log_std.register_hook(Average(swapped))
     for hidden, heads in networks:
         read = observed
         for layer in hidden:
             if isinstance(layer, torch.nn.Linear):
-                units = Images.of_units(len(mirrors), layer.out_features)
+                units = unit_images(len(mirrors), layer.out_features)
                 _tie_layer(layer, units, read)
                 read = units
         for head, written in heads:

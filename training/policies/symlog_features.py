@@ -7,6 +7,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
+from training.policies.reflections import Images, component_indices
 from training.settings.errors import UsageError
 
 UNITS = (0.1, 0.002)
@@ -16,35 +17,6 @@ UNITS = (0.1, 0.002)
 def symlog(x: torch.Tensor) -> torch.Tensor:
     """sign(x) ln(1 + |x|): linear near zero, logarithmic far from it."""
     return torch.sign(x) * torch.log1p(torch.abs(x))
-
-
-def component_indices(
-    name: str, indices: Sequence[int | str], size: int, vector: str = "observation"
-) -> list[int]:
-    """Which components of a vector of this size are meant, counted from 0.
-
-    Args:
-        name: Setting, for the message.
-        indices: Indices, -1 being the last component, and slices such as "0:-1:3".
-        size: Size of the vector.
-        vector: What the vector is, for the message.
-
-    Raises:
-        UsageError: There is no such component.
-    """
-    found: list[int] = []
-    for index in indices:
-        if isinstance(index, str):
-            bounds = [int(bound) if bound else None for bound in index.split(":")]
-            found += range(size)[slice(*bounds)]
-        elif -size <= index < size:
-            found.append(index % size)
-        else:
-            raise UsageError(
-                f"{name}: {index} in {list(indices)}, should be a component of the {vector}, "
-                f"{-size} to {size - 1}"
-            )
-    return found
 
 
 class SymlogOffsets(BaseFeaturesExtractor):
@@ -89,7 +61,7 @@ class SymlogOffsets(BaseFeaturesExtractor):
         observed = len(chosen)
         rows = observed + goal + len(differences)
         super().__init__(space, rows * len(units))
-        self.keys, self.sizes, self.pairs = list(sizes), sizes, pairs
+        self.keys, self.sizes = list(sizes), sizes
         ends = np.cumsum(list(sizes.values()))
         first = self.first = dict(zip(sizes, ends - list(sizes.values()), strict=True))
         x = torch.zeros(rows, int(ends[-1]))
@@ -108,27 +80,27 @@ class SymlogOffsets(BaseFeaturesExtractor):
         parts = [observations[key].flatten(start_dim=1) for key in self.keys]
         return symlog(torch.cat(parts, dim=1) @ self.matrix.T)
 
-    def signs(self, observation: Sequence[int | str], goal: Sequence[int | str]) -> torch.Tensor:
-        """Which features [n] change sign (-1) or stay (1) where these components change sign.
+    def images(self, observation: Images, goal: Images) -> Images:
+        """Images [1, features] of the features where these are the images of their components.
 
         Args:
-            observation: Components of `observation`, as in the constructor.
-            goal: Components of both goals, likewise.
+            observation: Image of `observation` in a mirror.
+            goal: Image of both goals.
 
         Raises:
-            UsageError: There is no such component, or a difference would not keep its size.
+            UsageError: The image of a feature is no feature.
         """
-        sign = torch.ones(self.matrix.shape[1])
-        changing = {"observation": observation, "desired_goal": goal, "achieved_goal": goal}
-        for key, indices in changing.items():
-            listed = component_indices("mirrors", indices, self.sizes[key], key.replace("_", " "))
-            sign[[self.first[key] + index for index in listed]] = -1.0
-        for a, b in self.pairs:
-            if sign[self.first["observation"] + a] != sign[self.first["observation"] + b]:
-                raise UsageError(
-                    f"mirrors change the sign of one component of the difference [{a}, {b}], "
-                    "should be that of both or of none"
-                )
-        # each row holds one component, or two that both change their sign
-        changed = ((self.matrix != 0.0) & (sign < 0.0)).any(dim=1)
-        return torch.where(changed, -1.0, 1.0)
+        x = torch.empty_like(self.matrix)  # rows of the matrix for the image of the observation
+        for key in self.keys:
+            source, sign = observation if key == "observation" else goal
+            columns = torch.arange(self.first[key], self.first[key] + self.sizes[key])
+            x[:, columns[source[0]]] = self.matrix[:, columns] * sign[0]
+        same, opposite = ((x[:, None] == y).all(dim=2) for y in (self.matrix, -self.matrix))
+        for row in torch.nonzero(~(same | opposite).any(dim=1)):
+            raise UsageError(
+                f"mirrors: the image of feature {int(row)} is no feature: components that change "
+                "places should both be observed, and those of a difference should both change "
+                "sign, or none"
+            )
+        source = (same | opposite).int().argmax(dim=1)
+        return Images(source[None], torch.where(same.any(dim=1), 1.0, -1.0)[None])

@@ -186,15 +186,22 @@ def index_pairs(value: Any) -> list[list[int]]:
     return pairs
 
 
-def mirror_list(value: Any) -> list[dict[str, list[int]]]:
-    """Reflections: the components that change sign, as in [{observation: [0, 3], actions: [0]}]."""
-    one = mapping(dict.fromkeys(("observation", "goal", "actions"), indices))
+def mirror_list(value: Any) -> list[dict[str, list[Any]]]:
+    """What changes in mirrors: components that change sign, and pairs that change places."""
+
+    def entries(one: Any) -> list[Any]:
+        pairs = [entry for entry in _check_type(list, one) if isinstance(entry, list)]
+        index_pairs(pairs)
+        indices([entry for entry in one if not isinstance(entry, list)])
+        return list(one)
+
+    keys = mapping(dict.fromkeys(("observation", "goal", "actions"), entries))
     try:
-        return [one(mirror) for mirror in _check_type(list, value)]
+        return [keys(mirror) for mirror in _check_type(list, value)]
     except InvalidValue as error:
         raise InvalidValue(
-            "a list of the components that change sign in each mirror, as in "
-            f"[{{observation: [0, 3], goal: [0], actions: [0]}}]: {error}"
+            "a list of what changes in each mirror, components that change sign and pairs that "
+            f"change places, as in [{{observation: [0, [3, 4]], actions: [0]}}]: {error}"
         ) from None
 
 

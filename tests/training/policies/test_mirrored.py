@@ -8,6 +8,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import FloatSchedule
 
 from training.policies.policy_file import load_policy_file
+from training.policies.reflections import reflection
 from training.policies.symlog import BoundedSymlogPolicy
 from training.policies.symlog_features import SymlogOffsets
 from training.sb3.train import train
@@ -21,10 +22,11 @@ SPACE = spaces.Dict(
     desired_goal=spaces.Box(-1.0, 1.0, (2,)),
     observation=spaces.Box(-1.0, 1.0, (5,)),
 )
-MIRRORS = [
-    {"observation": [0, 2], "goal": [0], "actions": [0, -1]},
-    {"observation": [1, -2], "goal": [1], "actions": [1]},
+MIRRORS = [  # two components of each change places, or change their sign
+    {"observation": [[0, 1], [2, -2]], "goal": [[0, 1]], "actions": [[0, 1], -1]},
+    {"observation": ["0:4"], "goal": [0, 1], "actions": [0, 1]},
 ]
+KEYS = (("observation", "observation"), ("goal", "desired_goal"))
 DIFFERENCES = [[2, 0], [3, 1]]
 
 
@@ -48,10 +50,11 @@ def states(n=7):
 def mirrored(values, chosen):
     """Observations and actions [n, ...] in these mirrors."""
     names = {"achieved_goal": "goal", "desired_goal": "goal"}
-    seen = {key: value.clone() for key, value in values.items()}
+    seen = dict(values)
     for mirror in chosen:
         for key, value in seen.items():
-            value[:, mirror[names.get(key, key)]] *= -1.0
+            image = reflection(mirror[names.get(key, key)], value.shape[1], key)
+            seen[key] = value[:, image.source[0]] * image.sign[0]
     return seen
 
 
@@ -66,8 +69,8 @@ def assert_equivariant(made, tolerance=1e-5):
     assert mean.std() > 1e-3
     for chosen in ([MIRRORS[0]], [MIRRORS[1]], MIRRORS):
         image = answers(made, mirrored(observation, chosen))
-        expected = mirrored({"actions": mean}, chosen)["actions"]
-        for found, wanted in zip(image, (expected, std, value), strict=True):
+        expected, spread = (mirrored({"actions": x}, chosen)["actions"] for x in (mean, std))
+        for found, wanted in zip(image, (expected, spread.abs(), value), strict=True):
             torch.testing.assert_close(found, wanted, atol=tolerance, rtol=tolerance)
 
 
@@ -91,6 +94,9 @@ def test_a_policy_stays_equivariant_while_it_learns():
         ((value - actions[:, :1]).square().mean() - likelihood.mean()).backward()
         made.optimizer.step()
     assert made.std_net.weight.abs().max() > 0.01
+    one, other, apart = made.log_std.tolist()
+    assert one == other
+    assert one != pytest.approx(apart, abs=1e-3)
     assert_equivariant(made, 1e-3)
 
 
@@ -145,7 +151,9 @@ def test_the_mirrors_of_stack_are_those_of_its_physics(axis, blocks):
         envs.single_observation_space, kwargs["differences"], kwargs["components"], [1.0]
     )
     mirror = kwargs["mirrors"][axis]
-    signs = features.signs(mirror["observation"], mirror["goal"]).numpy()
+    signs = features.images(
+        *(reflection(mirror[key], features.sizes[vector], vector) for key, vector in KEYS)
+    ).sign.numpy()
     assert mirror["actions"] == [axis]
     envs.reset(seed=0)
     runner = envs._runner
@@ -174,7 +182,51 @@ def test_the_mirrors_of_stack_are_those_of_its_physics(axis, blocks):
     envs.close()
 
 
+def test_the_mirror_of_push_t_is_that_of_its_physics():
+    config = load_config("ppo", "RigidEnvs/PushT-v0")
+    envs = make_vector_env("RigidEnvs/PushT-v0", 64, **config.env_kwargs)
+    (mirror,) = config.policy_kwargs["mirrors"]
+    seen, goal, action = (
+        reflection(mirror[key], space.shape[1], key)
+        for key, space in (
+            ("observation", envs.observation_space["observation"]),
+            ("goal", envs.observation_space["desired_goal"]),
+            ("actions", envs.action_space),
+        )
+    )
+    envs.reset(seed=0)
+    runner = envs._runner
+    begin, desired = runner.world.read(), runner._goals.copy()
+    position, orientation = begin.position.copy(), begin.orientation[:, :1].copy()
+    assert np.abs(desired[:, goal.source[0]] * goal.sign.numpy() - desired).max() < 1e-6
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (12, 64, 2)).astype(np.float32)
+
+    def rollout(image):
+        """Observations and rewards of an episode, or of that in the mirror y = -x."""
+        at, turned = position.copy(), orientation.copy()
+        if image:
+            at[:, :, :2] = -position[:, :, 1::-1]
+            yaw = 0.5 * np.pi - 2.0 * np.arctan2(orientation[:, :, 2], orientation[:, :, 3])
+            turned[:, :, 2], turned[:, :, 3] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+        runner.world.reset()
+        runner.world.set_state(position=at[:, :1], orientation=turned, drive_position=at[:, 1:])
+        runner._now = runner.world.read()
+        found = []
+        for step in actions:
+            moved = step[:, action.source[0]] * action.sign.numpy() if image else step
+            observation, reward, *_ = envs.step(moved)
+            found.append((observation["observation"].copy(), reward.copy()))
+        return found
+
+    for (direct, reward), (image, image_reward) in zip(rollout(False), rollout(True), strict=True):
+        expected = direct[:, seen.source[0]] * seen.sign.numpy()
+        np.testing.assert_allclose(image, expected, atol=0.02)
+        np.testing.assert_allclose(image_reward, reward, atol=0.02)
+    envs.close()
+
+
 def test_wrong_mirrors_raise(quick_ppo, quick_sac):
+    first = {"observation": [[0, 1], [2, 3]], "goal": [[0, 1]]}
     for mirrors, message in (
         (
             [{"observation": [5]}],
@@ -187,8 +239,13 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
         ([{"actions": [-4]}], r"mirrors: -4 in \[-4\], .* of the action, -3 to 2"),
         (
             [{"observation": [0]}],
-            r"one component of the difference \[2, 0\], should be that of both",
+            "mirrors: the image of feature 7 is no feature: components that",
         ),
+        (
+            [{"observation": [0, [0, 1]]}],
+            r"\[0, \[0, 1\]\] of the observation does not give it back",
+        ),
+        ([first, {"observation": [0, 2]}], "the images of two mirrors depend on their order"),
     ):
         with pytest.raises(UsageError, match=message):
             policy(mirrors)
@@ -197,6 +254,7 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
     for config in (quick_ppo, quick_sac):
         with pytest.raises(UsageError, match="mirrors requires"):
             config.replace(policy_kwargs={"mirrors": MIRRORS})
-    for wrong in ("x", [[0]], [{"goals": [0]}], [{"goal": 0}], [{"goal": ["0"]}]):
-        with pytest.raises(UsageError, match="a list of the components that change sign in each m"):
+    lists = [{"goals": [0]}], [{"goal": 0}], [{"goal": ["0"]}], [{"goal": [[0]]}]
+    for wrong in ("x", [[0]], *lists):
+        with pytest.raises(UsageError, match="a list of what changes in each mirror, components t"):
             quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"mirrors": wrong})
