@@ -55,12 +55,11 @@ def reflection(entries: Sequence[Entry], size: int, vector: str) -> Images:
     """
     found, name = unchanged(size), vector.replace("_", " ")
     for entry in entries:
-        pair = not isinstance(entry, int | str)
-        indices = component_indices("mirrors", entry if pair else [entry], size, name)
-        if pair:
-            found.source[0, indices] = found.source[0, indices[::-1]]
+        if isinstance(entry, int | str):
+            found.sign[0, component_indices("mirrors", [entry], size, name)] *= -1.0
         else:
-            found.sign[0, indices] *= -1.0
+            pair = component_indices("mirrors", entry, size, name)
+            found.source[0, pair] = found.source[0, pair[::-1]]
     if not found.after(found).same_as(unchanged(size)):
         raise UsageError(
             f"mirrors: {list(entries)} of the {name} does not give it back when it is mirrored "
