@@ -286,13 +286,17 @@ class Stack(Task):
         cube = self._next_cube(world, now, achieved, desired)
         all_placed = cube.placed == n
         at_goal = distance(cube.position, cube.goal) <= THRESHOLD
-        # open fingers around a cube are rewarded for starting to close
-        around = np.all(np.abs(hand - cube.position) < HALF, axis=1)
         opened = self.hand.commanded_opening(now) / self.hand.max_opening
+        # fingers around a cube are rewarded for starting to close, and for pressing firmly: a cube
+        # that is held loosely slips when it is lifted
+        around = np.all(np.abs(hand - cube.position) < HALF, axis=1)
+        grip = np.where(
+            cube.held, np.maximum(1.0 - opened, 0.5), around * np.minimum(1.0 - opened, 0.5)
+        )
         terms = {
             "reach": proximity(path_length(hand, cube.position)),
             # 1 at the goal too, so that letting go of the cube there costs nothing
-            "grasp": np.where(at_goal | cube.held, 1.0, around * np.minimum(1.0 - opened, 0.5)),
+            "grasp": np.where(at_goal, 1.0, grip),
             "place": proximity(path_length(cube.position, cube.goal)),
             # rises as soon as the action asks for a weaker grip, before the fingers move; a grip
             # that still holds a cube of 4 cm earns less than half of it

@@ -224,7 +224,7 @@ def test_stage_never_falls_by_much_while_a_controller_stacks():
 
 
 @pytest.mark.parametrize(("cube", "factor"), [(0, 1.0), (1, 0.0)])  # 1 is not the next cube
-def test_closing_around_the_next_cube_pays_until_it_is_held(cube, factor):
+def test_closing_around_the_next_cube_pays(cube, factor):
     env = make(STACK)
     observation, _ = env.reset(seed=0)
     world, hand = env._runner.world, env._runner.task.hand
@@ -232,7 +232,7 @@ def test_closing_around_the_next_cube_pays_until_it_is_held(cube, factor):
     half = 0.5 * hand.max_opening + hand.PAD
     fingers = place + np.array([[0.0, -half, 0.0], [0.0, half, 0.0]])
     world.set_state(drive_position=fingers[None])
-    for grip, grasp in ((1.0, 0.0), (0.5, 0.25), (0.25, 0.375), (-1.0, 1.0)):
+    for grip, grasp in ((1.0, 0.0), (0.5, 0.25), (0.25, 0.375), (-0.5, 0.75), (-1.0, 1.0)):
         for _ in range(10):
             strides = (place - observation["observation"][8:11]) / hand.stride
             observation, *_, info = env.step(np.clip([*strides, grip], -1.0, 1.0))
