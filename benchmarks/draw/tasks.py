@@ -40,7 +40,7 @@ class Strip(NamedTuple):
 
 STRIPS = {
     "push": Strip("Push", 1_000_008, (0, 6, 12, 20), {}),
-    "pusht": Strip("PushT", 1_000_007, (0, 12, 30, 60), {}),
+    "pusht": Strip("PushT", 1_000_009, (0, 12, 30, 60), {}),
     "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),
     "slide": Strip("Slide", 1_000_000, (0, 5, 12, 30), {}),
     "stack": Strip("Stack", 1_000_000, (0, 14, 60, 140), {"blocks": 3}),
