@@ -32,7 +32,7 @@ def test_other_arguments_make_another_table(repository, runs, quick_ppo):
     assert tasks == ["Test-Reach-v0", "Test-Reach-v0-max_episode_steps-5"]
     page = (repository / "docs/results.md").read_text()
     assert page.count("## Test/Reach-v0, PPO\n") == 1
-    assert page.count("## Test/Reach-v0 with max_episode_steps, PPO\n") == 1
+    assert page.count("## Test/Reach-v0 with max_episode_steps=5, PPO\n") == 1
 
 
 def test_names_of_tasks_contain_the_arguments_that_change_the_task():
