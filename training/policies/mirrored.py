@@ -55,7 +55,11 @@ class Average:
         self.source, self.sign = source[:, chosen].flatten(), sign[:, chosen]
 
     def __call__(self, values: torch.Tensor) -> torch.Tensor:
-        """The average, in the shape of the values."""
+        """The average, in the shape and on the device of the values."""
+        if self.source.device != values.device:  # a policy moves to its device once it is built
+            self.source, self.sign = self.source.to(values.device), self.sign.to(values.device)
+            self.place = self.place.to(values.device)
+            self.place_sign = self.place_sign.to(values.device)
         images = values.flatten().index_select(0, self.source).view_as(self.sign)
         average = (images * self.sign).mean(dim=0)
         return (average.index_select(0, self.place) * self.place_sign).view_as(values)
