@@ -28,7 +28,7 @@ CELL_CENTERS = CELL * np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1)])
 # start
 HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 
-# dense reward: weights of the terms of the next cube within `stage`
+# dense reward: weights of the next cube's terms within `stage`, and of those of a finished tower
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
 RETREAT_WEIGHT, PRECISION_WEIGHT = 0.3, 0.5
 RETREAT = 0.1  # m above the place of the top cube at which `retreat` is 1
@@ -48,14 +48,14 @@ class NextCube(NamedTuple):
         position: [count, 3] m, where the cube is.
         goal: [count, 3] m, where it belongs.
         held: [count] whether both fingers press on it from its sides.
-        distance: [count] m, the largest distance of any cube from its goal.
+        largest_distance: [count] m, of any cube from its goal.
     """
 
     placed: Array
     position: Array
     goal: Array
     held: Array
-    distance: Array
+    largest_distance: Array
 
 
 class Stack(Task):
@@ -275,7 +275,7 @@ class Stack(Task):
     def terms(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`placed`; the next cube's `reach`, `grasp`, `place`, `release`; three of the tower.
+        """`placed`; the next cube's `reach`, `grasp`, `place`, `release`; the tower's terms.
 
         `placed` is the number of cubes that stand in the tower and are not held. The four terms of
         the next cube lie within 0 and 1. `stage` combines all of them in one number from 0 to 1.
@@ -315,7 +315,7 @@ class Stack(Task):
             **terms,
             "stage": (np.minimum(cube.placed, n - 1) + stage) / n,
             "retreat": all_placed * np.clip(above / RETREAT, 0.0, 1.0),
-            "precision": all_placed * np.maximum(1.0 - cube.distance / THRESHOLD, 0.0),
+            "precision": all_placed * np.maximum(1.0 - cube.largest_distance / THRESHOLD, 0.0),
         }
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:

@@ -50,7 +50,9 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
     from training.settings.config_file import parse_settings
 
     changes = parse_settings(options.hyperparams, "--hyperparams")
-    for name in ("n_timesteps", "n_envs", "seed"):
+    if options.n_timesteps is not None:
+        config = config.with_steps(options.n_timesteps)
+    for name in ("n_envs", "seed"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
     if options.demonstrations is not None:

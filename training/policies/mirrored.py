@@ -1,17 +1,17 @@
-"""Networks that act in the mirror image of a state as the mirror shows it.
+"""Networks that are equivariant under reflections: mirrored states get mirrored actions.
 
 A task that looks the same in a mirror does not have to be learned on both sides of it. In each
 mirror some components of observation and action change their sign or place. The network is
 equivariant: where it answers the observation s with the mean action a, it answers the mirror image
 of s with that of a, and both states have the same value.
 
-Hidden units come in groups of one for each combination of the reflections (four for two
-reflections); a reflection swaps units within their groups. A layer with weights W is equivariant if
-W = P W Q for each combination, where Q mirrors what the layer reads and P what it writes. The
-average of P W Q over all combinations has this property. So the first weights are averaged, and so
-is each gradient: the optimiser keeps the property, and layers and files are those of an ordinary
-network. An averaged gradient is that of the loss on the batch and all its mirror images (van der
-Pol et al., MDP homomorphic networks, 2020).
+Hidden units come in groups of 2^m, one for each combination of m reflections; a reflection swaps
+units within their groups. A layer with weights W is equivariant if W = P W Q for each combination,
+where Q mirrors what the layer reads and P what it writes. The average of P W Q over all
+combinations has this property. So the initial weights are averaged, and so is each gradient: the
+optimiser keeps the property, and layers and files are those of an ordinary network. An averaged
+gradient is that of the loss on the batch and all its mirror images (van der Pol et al., MDP
+homomorphic networks, 2020).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,22 +25,31 @@ from stable_baselines3.common.type_aliases import Schedule
 from training.policies.reflections import (
     Entry,
     Images,
-    combinations,
+    all_combinations,
     reflection,
     unchanged,
     unit_images,
 )
 from training.policies.symlog_features import SymlogOffsets
+from training.settings.errors import UsageError
 
 
 class Average:
     """Averages the weights [out, in] or biases [out] of a layer over all mirror images.
 
-    Weights that are images of each other have one average, which is computed once.
+    The combinations of reflections form a group. So all images of a weight have the same average,
+    up to the sign, and it is computed once for each of g sets of weights:
+    average[g] = mean over c of sign[c, g] weight[source[c, g]].
 
     Args:
-        written: Images of what the layer writes.
-        read: Images of what it reads; None for biases.
+        written: Images [k, out] of what the layer writes.
+        read: Images [k, in] of what it reads; None for biases.
+
+    Attributes:
+        source: [k g] indices of weights, flattened.
+        sign: [k, g] ±1.
+        place: [out in] the set to which each weight belongs.
+        place_sign: [out in] ±1, its sign with respect to the average of the set.
     """
 
     def __init__(self, written: Images, read: Images | None = None):
@@ -75,8 +84,11 @@ class Mirrored:
         **kwargs: As for the policy.
 
     Raises:
-        UsageError: There is no such component, the image of a feature is no feature, the order of
-            two mirrors matters, or a hidden layer cannot be divided into groups.
+        UsageError: A key or a component is unknown, the image of a feature is no feature, the order
+            of two mirrors matters, there is no hidden layer, or one cannot be divided into groups.
+
+    Gradients are averaged by hooks, which torch does not copy: save and load a policy instead of
+    copying or pickling it.
     """
 
     def __init__(
@@ -100,13 +112,19 @@ def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[Entr
     assert isinstance(extractor, SymlogOffsets)
     features, acts = [], []
     for mirror in mirrors:
+        unknown = sorted(set(mirror) - {"observation", "goal", "actions"})
+        if unknown:
+            raise UsageError(
+                f"mirrors: key {unknown[0]!r}, should be 'observation', 'goal' or 'actions'"
+            )
+        acts.append(reflection(mirror.get("actions", ()), actions, "action"))
         seen, goal = (
             reflection(mirror.get(key, ()), extractor.sizes[vector], vector)
             for key, vector in (("observation", "observation"), ("goal", "desired_goal"))
         )
         features.append(extractor.images(seen, goal))
-        acts.append(reflection(mirror.get("actions", ()), actions, "action"))
-    observed, acted = combinations(features), combinations(acts)
+    observed = all_combinations(features, "observation")
+    acted = all_combinations(acts, "action")
     swapped = acted._replace(sign=torch.ones_like(acted.sign))  # a deviation has no sign
     networks: list[tuple[Any, list[tuple[Any, Images]]]] = [
         (policy.mlp_extractor.policy_net, [(policy.action_net, acted)]),
@@ -116,6 +134,8 @@ def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[Entr
         networks[0][1].append((policy.std_net, swapped))
     policy.log_std.register_hook(Average(swapped))
     for hidden, heads in networks:
+        if not any(isinstance(layer, torch.nn.Linear) for layer in hidden):
+            raise UsageError("net_arch has no hidden layer, mirrors requires one or more")
         read = observed
         for layer in hidden:
             if isinstance(layer, torch.nn.Linear):

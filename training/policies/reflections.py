@@ -1,11 +1,12 @@
 """Reflections of vectors: some components change sign, and some change places."""
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import combinations, product
 from typing import NamedTuple
 
 import torch
 
+from training.settings.components import component_indices
 from training.settings.errors import UsageError
 
 Entry = int | str | Sequence[int]
@@ -26,7 +27,7 @@ class Images(NamedTuple):
     sign: torch.Tensor
 
     def after(self, other: "Images") -> "Images":
-        """Images of the images that `other` makes."""
+        """Images [k, n] of the image [1, n], or of each of the images [k, n], of `other`."""
         sign = self.sign * torch.gather(other.sign.expand_as(self.sign), 1, self.source)
         source = torch.gather(other.source.expand_as(self.source), 1, self.source)
         return Images(source, sign)
@@ -42,7 +43,7 @@ def unchanged(n: int) -> Images:
 
 
 def reflection(entries: Sequence[Entry], size: int, vector: str) -> Images:
-    """The image [1, size] in one mirror.
+    """The image [1, size] of a vector in one mirror.
 
     Args:
         entries: Components that change sign, as indices or slices; and pairs [a, b] that change
@@ -51,15 +52,16 @@ def reflection(entries: Sequence[Entry], size: int, vector: str) -> Images:
         vector: Name of the vector, for messages.
 
     Raises:
-        UsageError: There is no such component, or two reflections do not give the vector back.
+        UsageError: There is no such component, it is listed twice, or two reflections do not give
+            the vector back.
     """
     found, name = unchanged(size), vector.replace("_", " ")
-    for entry in entries:
-        if isinstance(entry, int | str):
-            found.sign[0, component_indices("mirrors", [entry], size, name)] *= -1.0
-        else:
-            pair = component_indices("mirrors", entry, size, name)
-            found.source[0, pair] = found.source[0, pair[::-1]]
+    signs = [entry for entry in entries if isinstance(entry, int | str)]
+    pairs = [entry for entry in entries if not isinstance(entry, int | str)]
+    found.sign[0, component_indices("mirrors", signs, size, name)] = -1.0
+    swapped = component_indices("mirrors", [one for pair in pairs for one in pair], size, name)
+    for a, b in zip(swapped[::2], swapped[1::2], strict=True):
+        found.source[0, [a, b]] = torch.tensor([b, a])
     if not found.after(found).same_as(unchanged(size)):
         raise UsageError(
             f"mirrors: {list(entries)} of the {name} does not give it back when it is mirrored "
@@ -68,18 +70,21 @@ def reflection(entries: Sequence[Entry], size: int, vector: str) -> Images:
     return found
 
 
-def combinations(mirrors: Sequence[Images]) -> Images:
-    """The images in all combinations of mirrors, the first of which uses none.
+def all_combinations(mirrors: Sequence[Images], vector: str) -> Images:
+    """The images [2^m, n] of a vector in all combinations of m mirrors, the first without any.
 
     Args:
-        mirrors: The image in each mirror, of the same vector.
+        mirrors: The image [1, n] in each mirror.
+        vector: Name of the vector, for messages.
 
     Raises:
         UsageError: The order of two reflections matters.
     """
-    for one, other in product(mirrors, repeat=2):
+    for (i, one), (j, other) in combinations(enumerate(mirrors), 2):
         if not one.after(other).same_as(other.after(one)):
-            raise UsageError("mirrors: the images of two mirrors depend on their order")
+            raise UsageError(
+                f"mirrors: the image of the {vector} in mirrors {i} and {j} depends on their order"
+            )
     found = []
     for used in product((False, True), repeat=len(mirrors)):
         image = unchanged(mirrors[0].source.shape[1])
@@ -90,10 +95,14 @@ def combinations(mirrors: Sequence[Images]) -> Images:
 
 
 def unit_images(mirrors: int, n: int) -> Images:
-    """Images of n hidden units in groups of one for each combination of mirrors.
+    """Images [2^m, n] of hidden units in groups of 2^m, which reflections permute.
+
+    Args:
+        mirrors: Number m of mirrors.
+        n: Number of units.
 
     Raises:
-        UsageError: n is not a multiple of the number of combinations.
+        UsageError: n is not a multiple of 2^m.
     """
     size = 2**mirrors
     if n % size:
@@ -105,32 +114,3 @@ def unit_images(mirrors: int, n: int) -> Images:
     member, group = unit // (n // size), unit % (n // size)
     rows = [(member ^ used) * (n // size) + group for used in range(size)]
     return Images(torch.stack(rows), torch.ones(size, n))
-
-
-def component_indices(
-    name: str, indices: Sequence[int | str], size: int, vector: str = "observation"
-) -> list[int]:
-    """Which components of a vector of this size are meant, counted from 0.
-
-    Args:
-        name: Setting, for the message.
-        indices: Indices, -1 being the last component, and slices such as "0:-1:3".
-        size: Size of the vector.
-        vector: What the vector is, for the message.
-
-    Raises:
-        UsageError: There is no such component.
-    """
-    found: list[int] = []
-    for index in indices:
-        if isinstance(index, str):
-            bounds = [int(bound) if bound else None for bound in index.split(":")]
-            found += range(size)[slice(*bounds)]
-        elif -size <= index < size:
-            found.append(index % size)
-        else:
-            raise UsageError(
-                f"{name}: {index} in {list(indices)}, should be a component of the {vector}, "
-                f"{-size} to {size - 1}"
-            )
-    return found

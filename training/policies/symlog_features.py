@@ -7,7 +7,8 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from training.policies.reflections import Images, component_indices
+from training.policies.reflections import Images, unchanged
+from training.settings.components import component_indices
 from training.settings.errors import UsageError
 
 UNITS = (0.1, 0.002)
@@ -38,7 +39,8 @@ class SymlogOffsets(BaseFeaturesExtractor):
         units: What each x is divided by, in the unit of x.
 
     Raises:
-        UsageError: The space has no goals, or the observation has no such component.
+        UsageError: The space has no goals, or the observation has no such component, or it is
+            listed twice.
     """
 
     matrix: torch.Tensor
@@ -74,6 +76,11 @@ class SymlogOffsets(BaseFeaturesExtractor):
             x[row, first["observation"] + a] = 1.0
             x[row, first["observation"] + b] = -1.0
         self.register_buffer("matrix", torch.cat([x / unit for unit in units]))
+        self.names = [
+            *(f"component {component} of the observation" for component in chosen),
+            *(f"component {row} of desired minus achieved goal" for row in range(goal)),
+            *(f"the difference {list(pair)}" for pair in differences),
+        ] * len(units)
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         """Features [n, len(units) (components + goal + differences)]."""
@@ -88,7 +95,8 @@ class SymlogOffsets(BaseFeaturesExtractor):
             goal: Image of both goals.
 
         Raises:
-            UsageError: The image of a feature is no feature.
+            UsageError: The image of a feature is no feature, no feature changes, or one is listed
+                twice.
         """
         x = torch.empty_like(self.matrix)  # rows of the matrix for the image of the observation
         for key in self.keys:
@@ -96,11 +104,18 @@ class SymlogOffsets(BaseFeaturesExtractor):
             columns = torch.arange(self.first[key], self.first[key] + self.sizes[key])
             x[:, columns[source[0]]] = self.matrix[:, columns] * sign[0]
         same, opposite = ((x[:, None] == y).all(dim=2) for y in (self.matrix, -self.matrix))
-        for row in torch.nonzero(~(same | opposite).any(dim=1)):
+        missing = torch.nonzero(~(same | opposite).any(dim=1)).flatten().tolist()
+        if missing:
             raise UsageError(
-                f"mirrors: the image of feature {int(row)} is no feature: components that change "
-                "places should both be observed, and those of a difference should both change "
-                "sign, or none"
+                f"mirrors: the image of {self.names[missing[0]]} is no feature: of components that "
+                "change places, and of differences whose components do, both should be observed; "
+                "the components of a difference should both change sign, or none"
             )
         source = (same | opposite).int().argmax(dim=1)
-        return Images(source[None], torch.where(same.any(dim=1), 1.0, -1.0)[None])
+        found = Images(source[None], torch.where(same.any(dim=1), 1.0, -1.0)[None])
+        original = unchanged(len(self.matrix))
+        if found.same_as(original):
+            raise UsageError("mirrors: no feature changes in a mirror, so no action could")
+        if not found.after(found).same_as(original):
+            raise UsageError("mirrors requires that differences lists no pair twice, in any order")
+        return found

@@ -174,7 +174,7 @@ def _command(config: TrainConfig) -> str:
         packaged = load_config(config.algo, config.env_id)
         if packaged.replace(**given) == config:
             return f"{words} --seed {config.seed}"
-        if packaged.replace(**given, n_timesteps=config.n_timesteps) == config:
+        if packaged.replace(**given).with_steps(config.n_timesteps) == config:
             return f"{words} --seed {config.seed} -n {config.n_timesteps}"
     except UsageError:  # there are no packaged settings for it
         pass

@@ -66,6 +66,11 @@ class PPOConfig(TrainConfig):
     target_kl: float | None = setting(optional(number(above=0)), None)
     """End an update at this KL divergence from the policy before it; null for no limit."""
 
+    @property
+    def rollout(self) -> int:
+        """Environment steps between two updates, summed over the worlds."""
+        return self.n_envs * self.n_steps
+
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
         for name in ("min_std", "state_dependent_std"):
@@ -74,7 +79,7 @@ class PPOConfig(TrainConfig):
                     f"{where}: policy_kwargs: {name} requires policy: "
                     f"{' or '.join(BOUNDED_POLICIES)}"
                 )
-        rollout = self.n_envs * self.n_steps
+        rollout = self.rollout
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:
             raise UsageError(
@@ -123,6 +128,11 @@ class SACConfig(TrainConfig):
     Afterwards it imitates and climbs the critic, without entropy (TD3+BC). 0: SAC."""
     cloning_weight: float = setting(number(at_least=0), 50.0)
     """Weight of the squared distance to demonstrated actions, relative to the critic's value."""
+
+    @property
+    def rollout(self) -> int:
+        """Environment steps between two updates, summed over the worlds."""
+        return self.n_envs * self.train_freq
 
     @property
     def demonstration_batch(self) -> int:

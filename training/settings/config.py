@@ -57,7 +57,7 @@ NETWORK_RULES = {
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
 """Further ones, of policies with features on a logarithmic scale, in actor or critic."""
 MIRROR_RULES = {"mirrors": mirror_list}
-"""Further ones, of policies that act in a mirrored state as the mirror shows."""
+"""Further ones, of policies that are equivariant under reflections."""
 PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
 """Further ones, of policies that act from pixels."""
 POLICY_RULES = NETWORK_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
@@ -160,6 +160,23 @@ class TrainConfig:
     def replace(self, source: str = "command line", **values: Any) -> Self:
         """A copy with other `values`, validated like those of a file."""
         return self.from_mapping(self.env_id, {**self.as_mapping(), **values}, source)
+
+    def with_steps(self, n_timesteps: int) -> Self:
+        """A run of another length; the fine-tuning stage keeps its part of it.
+
+        A run in which the stage would be shorter than a rollout has none.
+        """
+        stage = self.finetune_timesteps * n_timesteps // self.n_timesteps
+        if stage < self.rollout:
+            return self.replace(
+                n_timesteps=n_timesteps, finetune_timesteps=0, finetune_env_kwargs={}
+            )
+        return self.replace(n_timesteps=n_timesteps, finetune_timesteps=stage)
+
+    @property
+    def rollout(self) -> int:
+        """Environment steps between two updates, summed over the worlds."""
+        raise NotImplementedError
 
     @property
     def norm_obs(self) -> bool:

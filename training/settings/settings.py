@@ -2,11 +2,11 @@
 
 import dataclasses
 import math
-import re
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from training.settings.components import SLICE
 from training.settings.errors import nearest
 
 Rule = Callable[[Any], Any]
@@ -24,8 +24,6 @@ def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"rule": rule})
 
 
-SLICE = re.compile(r"-?\d*:-?\d*(:[1-9]\d*)?")
-"""A slice of indices: start, stop and step, each of which may be missing, as in "0:-1:3"."""
 MOST_FILTERS = 1024
 """Largest number of maps, width and stride of a convolution: more than two cores can train."""
 

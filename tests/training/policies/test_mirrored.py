@@ -1,4 +1,4 @@
-"""Mirrored policies: in the mirror image of a state they act as the mirror shows."""
+"""Mirrored policies: the mirror image of a state gets that of the action."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,9 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import FloatSchedule
 
+from training.policies.mirrored import Average
 from training.policies.policy_file import load_policy_file
-from training.policies.reflections import reflection
+from training.policies.reflections import reflection, unchanged
 from training.policies.symlog import BoundedSymlogPolicy
 from training.policies.symlog_features import SymlogOffsets
 from training.sb3.train import train
@@ -34,8 +35,9 @@ def policy(mirrors=MIRRORS, **kwargs):
     torch.manual_seed(3)
     actions = spaces.Box(-1.0, 1.0, (3,))
     return BoundedSymlogPolicy(
-        SPACE, actions, FloatSchedule(1e-2), mirrors=mirrors, differences=DIFFERENCES,
-        **{"net_arch": [8, 12], "state_dependent_std": True, "log_std_init": -1.0, **kwargs},
+        SPACE, actions, FloatSchedule(1e-2), mirrors=mirrors,
+        **{"net_arch": [8, 12], "state_dependent_std": True, "log_std_init": -1.0,
+           "differences": DIFFERENCES, **kwargs},
     )  # fmt: skip
 
 
@@ -117,6 +119,11 @@ def test_gradients_are_those_of_the_states_and_all_their_images():
         torch.testing.assert_close(one.grad, other.grad, atol=1e-5, rtol=1e-4)
 
 
+def test_averages_follow_the_weights_to_their_device():
+    average = Average(unchanged(3))
+    assert average(torch.empty(3, device="meta")).device.type == "meta"
+
+
 def test_a_saved_policy_keeps_its_mirrors(tmp_path):
     made = policy()
     made.save(tmp_path / "policy.pt")
@@ -151,9 +158,9 @@ def test_the_mirrors_of_stack_are_those_of_its_physics(axis, blocks):
         envs.single_observation_space, kwargs["differences"], kwargs["components"], [1.0]
     )
     mirror = kwargs["mirrors"][axis]
-    signs = features.images(
+    expected = features.images(
         *(reflection(mirror[key], features.sizes[vector], vector) for key, vector in KEYS)
-    ).sign.numpy()
+    )
     assert mirror["actions"] == [axis]
     envs.reset(seed=0)
     runner = envs._runner
@@ -162,7 +169,7 @@ def test_the_mirrors_of_stack_are_those_of_its_physics(axis, blocks):
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (8, 64, 4)).astype(np.float32)
 
     def rollout(flip):
-        """Features and stage of an episode in which positions are multiplied by flip [3]."""
+        """Features and reward of an episode in which positions are multiplied by flip [3]."""
         runner.world.reset()
         fingers = flip * pads if flip[1] > 0 else flip * pads[:, ::-1]  # the left one is the first
         runner.world.set_state(position=flip * cubes, drive_position=fingers)
@@ -170,15 +177,16 @@ def test_the_mirrors_of_stack_are_those_of_its_physics(axis, blocks):
         runner._now = runner.world.read()
         found = []
         for action in actions:
-            observation, *_, info = envs.step(action * [*flip, 1.0])
+            observation, reward, *_ = envs.step(action * [*flip, 1.0])
             seen = {key: torch.as_tensor(value) for key, value in observation.items()}
-            found.append((features(seen).numpy(), info["stage"].copy()))
+            found.append((features(seen).numpy(), reward.copy()))
         return found
 
     images = rollout(np.where(np.arange(3) == axis, -1.0, 1.0))
-    for (direct, stage), (image, image_stage) in zip(rollout(np.ones(3)), images, strict=True):
-        np.testing.assert_allclose(image, direct * signs, atol=0.01)
-        np.testing.assert_allclose(image_stage, stage, atol=2e-3)
+    for (direct, reward), (image, image_reward) in zip(rollout(np.ones(3)), images, strict=True):
+        wanted = direct[:, expected.source[0]] * expected.sign.numpy()
+        np.testing.assert_allclose(image, wanted, atol=0.01)
+        np.testing.assert_allclose(image_reward, reward, atol=0.005)
     envs.close()
 
 
@@ -230,31 +238,46 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
     for mirrors, message in (
         (
             [{"observation": [5]}],
-            r"mirrors: 5 in \[5\], should be a component of the obs.* -5 to 4",
+            r"mirrors: 5 in \[5\], should be components of the observation, -5 to 4",
         ),
         (
             [{"goal": [2]}],
-            r"mirrors: 2 in \[2\], should be a component of the desired goal, -2 to 1",
+            r"mirrors: 2 in \[2\], should be components of the desired goal, -2 to 1",
         ),
         ([{"actions": [-4]}], r"mirrors: -4 in \[-4\], .* of the action, -3 to 2"),
         (
             [{"observation": [0]}],
-            "mirrors: the image of feature 7 is no feature: components that",
+            r"mirrors: the image of the difference \[2, 0\] is no feature: of components",
         ),
         (
             [{"observation": [0, [0, 1]]}],
             r"\[0, \[0, 1\]\] of the observation does not give it back",
         ),
-        ([first, {"observation": [0, 2]}], "the images of two mirrors depend on their order"),
+        (
+            [first, {"observation": [0, 2]}],
+            "the image of the observation in mirrors 0 and 1 depends on their order",
+        ),
+        ([{"observation": ["0:2", 1]}], "lists component 1 of the observation twice"),
+        ([{"goal": [[0, 1], [1, 0]]}], "lists component 0 of the desired goal twice"),
+        ([{"actions": [[2, 2]]}], "lists component 2 of the action twice"),
+        ([{"observation": ["5:7"]}], r"5:7 in \['5:7'\], should be components of the obs"),
+        ([{"actions": [0]}], "no feature changes in a mirror, so no action could"),
+        ([{"action": [0]}], "key 'action', should be 'observation', 'goal' or 'actions'"),
     ):
         with pytest.raises(UsageError, match=message):
             policy(mirrors)
-    with pytest.raises(UsageError, match="a layer of 6 units, should have multiples of 4 with 2"):
-        policy(net_arch=[8, 6])
+    for net_arch, message in (
+        ([8, 6], "a layer of 6 units, should have multiples of 4 with 2 mirrors"),
+        ([], "net_arch has no hidden layer, mirrors requires one or more"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            policy(net_arch=net_arch)
+    with pytest.raises(UsageError, match="requires that differences lists no pair twice"):
+        policy(differences=[[2, 0], [0, 2], [3, 1], [1, 3]])
     for config in (quick_ppo, quick_sac):
         with pytest.raises(UsageError, match="mirrors requires"):
             config.replace(policy_kwargs={"mirrors": MIRRORS})
-    lists = [{"goals": [0]}], [{"goal": 0}], [{"goal": ["0"]}], [{"goal": [[0]]}]
+    lists = [{"goals": [0]}], [{"goal": 0}], [{"goal": ["-:3"]}], [{"goal": [[0]]}]
     for wrong in ("x", [[0]], *lists):
         with pytest.raises(UsageError, match="a list of what changes in each mirror, components t"):
             quick_ppo.replace(policy=SYMLOG_PPO_POLICY, policy_kwargs={"mirrors": wrong})

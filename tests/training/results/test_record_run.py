@@ -161,6 +161,9 @@ def test_command_is_the_shortest_that_repeats_the_training():
     words = "rigid-envs train --algo ppo --env RigidEnvs/Push-v0"
     assert _command(config.replace(seed=7)) == f"{words} --seed 7"
     assert _command(config.replace(seed=7, n_timesteps=1000)) == f"{words} --seed 7 -n 1000"
+    stack = load_config("ppo", "RigidEnvs/Stack-v0").replace(seed=7)
+    assert _command(stack.with_steps(9_000_000)).endswith("Stack-v0 --seed 7 -n 9000000")
+    assert "--config" in _command(stack.replace(n_timesteps=9_000_000))
     assert _command(config.replace(seed=7, gamma=0.5)) == (
         f"{words} --config results/ppo/RigidEnvs-Push-v0_seed7/config.yaml"
     )

@@ -127,3 +127,17 @@ def test_stage_shorter_than_a_rollout_raises(quick_ppo):
     with pytest.raises(UsageError, match="finetune_timesteps is 79, less than the last rollout"):
         quick_ppo.replace(finetune_timesteps=79, finetune_env_kwargs=FINER)
     quick_ppo.replace(finetune_timesteps=80, finetune_env_kwargs=FINER)
+
+
+def test_the_stage_keeps_its_part_of_a_run_of_another_length(quick_ppo, quick_sac):
+    ppo = quick_ppo.replace(n_timesteps=400, finetune_timesteps=100, finetune_env_kwargs=FINER)
+    assert ppo.with_steps(400) == ppo
+    assert ppo.with_steps(1200).finetune_timesteps == 300
+    sac = quick_sac.replace(n_timesteps=400, finetune_timesteps=100, finetune_env_kwargs=FINER)
+    for config in (ppo, sac):
+        least = -(-config.rollout * 400 // 100)
+        assert config.with_steps(least).finetune_timesteps == config.rollout
+        short = config.with_steps(least - 1)
+        assert (short.finetune_timesteps, short.finetune_env_kwargs) == (0, {})
+    with pytest.raises(UsageError, match="n_timesteps is 0, should be an integer of at least 1"):
+        ppo.with_steps(0)
