@@ -48,8 +48,10 @@ def config_at(task: str, preset: str) -> TrainConfig:
 def finished_at(task: str, first: str, last: str) -> TrainConfig:
     """Training at one preset that ends with a stage at another one."""
     config = config_at(task, first)
-    steps = int(LAST_STAGE * config.n_timesteps)
-    return config.replace(finetune_timesteps=steps, finetune_env_kwargs={"fidelity": last})
+    return config.replace(
+        finetune_timesteps=max(int(LAST_STAGE * config.n_timesteps), config.finetune_timesteps),
+        finetune_env_kwargs={**config.finetune_env_kwargs, "fidelity": last},
+    )
 
 
 def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:

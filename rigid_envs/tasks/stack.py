@@ -31,6 +31,9 @@ HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 # dense reward: weights of the next cube's terms within `stage`, and of those of a finished tower
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
 RETREAT_WEIGHT, PRECISION_WEIGHT = 0.3, 0.5
+# `place` of a cube that is not held, relative to that of one that is: a hand that may push cubes as
+# well as carry them learns late to lift one
+PUSHED = 0.2
 RETREAT = 0.1  # m above the place of the top cube at which `retreat` is 1
 DECAY_LENGTH = 0.15  # m of path after which `reach` and `place` fall to 1/e
 # Paths lead over other cubes, at the height of their end plus PASS_HEIGHT (m). The extra height
@@ -297,7 +300,8 @@ class Stack(Task):
             "reach": proximity(path_length(hand, cube.position)),
             # 1 at the goal too, so that letting go of the cube there costs nothing
             "grasp": np.where(at_goal, 1.0, grip),
-            "place": proximity(path_length(cube.position, cube.goal)),
+            "place": proximity(path_length(cube.position, cube.goal))
+            * np.where(cube.held | at_goal, 1.0, PUSHED),
             # rises as soon as the action asks for a weaker grip, before the fingers move; a grip
             # that still holds a cube of 4 cm earns less than half of it
             "release": at_goal * opened,

@@ -194,6 +194,25 @@ def test_a_tower_is_solved_only_when_let_go():
     assert half_open["stage"] == pytest.approx(1.0 - 0.5 * 0.35 * 0.5)
 
 
+def test_a_cube_that_is_not_held_earns_a_fifth_for_the_way_to_its_place():
+    env = make(STACK, reward_type="dense")
+    env.reset(seed=0)
+    world, tower = env._runner.world, cubes_of(env._runner.goals)
+    cubes = tower.astype(float)
+    cubes[0, 0] += [0.06, 0.0, 0.0]  # the upper one lies beside
+    cubes[0, 1] += [0.0, 0.12, -2.0 * HALF]
+    place = np.exp(-(3 * 0.05 + 0.06 + 0.05) / 0.15)  # the path up, across, and down
+    for gap, expected in ((0.01, 0.2 * place), (-0.001, place)):
+        offset = HALF + Stack.hand.PAD + gap
+        fingers = cubes[0, 0] + np.array([[0.0, side * offset, 0.0] for side in (-1, 1)])
+        world.set_state(position=cubes, drive_position=fingers[None])
+        env._runner._now = world.read()
+        info = env.step(np.array([0.0, 0.0, 0.0, -1.0 if gap < 0.0 else 0.5]))[4]
+        assert info["placed"] == 0.0
+        assert info["place"] == pytest.approx(expected, rel=0.1)
+        assert (info["grasp"] > 0.5) == (gap < 0.0)
+
+
 @pytest.mark.parametrize("leaning", [0, 1])
 def test_precision_falls_with_the_largest_distance_of_a_cube_from_its_place(leaning):
     env = make(STACK, reward_type="dense")
