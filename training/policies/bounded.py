@@ -1,5 +1,6 @@
 """A PPO policy with a bounded mean action and a minimum standard deviation."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,15 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     Args:
         *args: As for Stable-Baselines3's policy.
         min_std: Standard deviation that is added to the learned one.
+        log_std_init: Logarithm of the learned one at the start, one number or one for each
+            component of the action: fingers may have to explore where the hand must not.
         state_dependent_std: Whether the standard deviation depends on the observation; its
             logarithm then stays within `LOG_STD_RANGE`.
         **kwargs: As for Stable-Baselines3's policy.
 
     Raises:
-        UsageError: The bounds of the action are not ±1, or `log_std_init` is outside of the range.
+        UsageError: The bounds of the action are not ±1, or `log_std_init` is outside of the range
+            or has another number of components.
     """
 
     action_net: torch.nn.Linear
@@ -44,17 +48,24 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
     log_std: torch.nn.Parameter
 
     def __init__(
-        self, *args: Any, min_std: float = 0.0, state_dependent_std: bool = False, **kwargs: Any
+        self,
+        *args: Any,
+        min_std: float = 0.0,
+        log_std_init: float | Sequence[float] = 0.0,
+        state_dependent_std: bool = False,
+        **kwargs: Any,
     ):
         self.min_std, self.state_dependent_std = min_std, state_dependent_std
+        self.first_log_std = log_std_init
         super().__init__(*args, **kwargs)
         low, high = getattr(self.action_space, "low", 0.0), getattr(self.action_space, "high", 0.0)
         if not (np.all(low == -1.0) and np.all(high == 1.0)):
             raise UsageError(f"BoundedPolicy requires actions within ±1, not {self.action_space}")
         least, most = LOG_STD_RANGE
-        if state_dependent_std and not least < self.log_std_init < most:
+        within = bool(((self.log_std > least) & (self.log_std < most)).all())
+        if state_dependent_std and not within:
             raise UsageError(
-                f"log_std_init is {self.log_std_init}, should be above {least} and below {most} "
+                f"log_std_init is {log_std_init}, should be above {least} and below {most} "
                 "with state_dependent_std"
             )
 
@@ -62,11 +73,20 @@ class BoundedPolicy(MultiInputActorCriticPolicy):
         return {
             **super()._get_constructor_parameters(),
             "min_std": self.min_std,
+            "log_std_init": self.first_log_std,
             "state_dependent_std": self.state_dependent_std,
         }
 
     def _build(self, lr_schedule: Schedule) -> None:
         super()._build(lr_schedule)
+        first = torch.as_tensor(self.first_log_std)
+        if first.shape not in ((), self.log_std.shape):
+            raise UsageError(
+                f"log_std_init is {self.first_log_std}, should be one number or a list of "
+                f"{len(self.log_std)}, one for each component of the action"
+            )
+        with torch.no_grad():
+            self.log_std.copy_(first)
         if self.state_dependent_std:
             layer = torch.nn.Linear(self.mlp_extractor.latent_dim_pi, self.action_net.out_features)
             torch.nn.init.zeros_(layer.weight)

@@ -132,7 +132,10 @@ def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[Entr
     ]
     if getattr(policy, "state_dependent_std", False):
         networks[0][1].append((policy.std_net, swapped))
-    policy.log_std.register_hook(Average(swapped))
+    deviation = Average(swapped)
+    with torch.no_grad():
+        policy.log_std.copy_(deviation(policy.log_std))
+    policy.log_std.register_hook(deviation)
     for hidden, heads in networks:
         if not any(isinstance(layer, torch.nn.Linear) for layer in hidden):
             raise UsageError("net_arch has no hidden layer, mirrors requires one or more")

@@ -33,8 +33,14 @@ class SymlogPolicy(Symlog, MultiInputPolicy):
 
 
 class SymlogActorCriticPolicy(Mirrored, Symlog, MultiInputActorCriticPolicy):
-    """Stable-Baselines3's PPO policy with `SymlogOffsets` as its features."""
+    """Stable-Baselines3's PPO policy with `SymlogOffsets` as its features.
+
+    With `mirrors` it is equivariant, see `Mirrored`.
+    """
 
 
 class BoundedSymlogPolicy(Mirrored, Symlog, BoundedPolicy):
-    """`BoundedPolicy` for PPO, with `SymlogOffsets` as its features."""
+    """`BoundedPolicy` for PPO, with `SymlogOffsets` as its features.
+
+    With `mirrors` it is equivariant, see `Mirrored`.
+    """

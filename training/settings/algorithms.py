@@ -79,6 +79,14 @@ class PPOConfig(TrainConfig):
                     f"{where}: policy_kwargs: {name} requires policy: "
                     f"{' or '.join(BOUNDED_POLICIES)}"
                 )
+        if (
+            isinstance(self.policy_kwargs.get("log_std_init"), list)
+            and self.policy not in BOUNDED_POLICIES
+        ):
+            raise UsageError(
+                f"{where}: policy_kwargs: log_std_init is {self.policy_kwargs['log_std_init']}; "
+                f"a list requires policy: {' or '.join(BOUNDED_POLICIES)}"
+            )
         rollout = self.rollout
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:

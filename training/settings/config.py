@@ -25,6 +25,7 @@ from training.settings.settings import (
     mapping,
     mirror_list,
     number,
+    number_or_numbers,
     optional,
     positive_numbers,
     schedule,
@@ -50,7 +51,7 @@ ACTION_WRAPPERS = (
 NETWORK_RULES = {
     "net_arch": layer_widths,
     "activation": choice("tanh", "relu", "elu"),
-    "log_std_init": number(),
+    "log_std_init": number_or_numbers,
     "min_std": number(at_least=0),
     "state_dependent_std": boolean,
 }

@@ -140,6 +140,16 @@ def layer_widths(value: Any) -> list[int]:
         raise InvalidValue("a list of layer widths, as in [64, 64]") from None
 
 
+def number_or_numbers(value: Any) -> float | list[float]:
+    """A finite number, or a list of them, as in [-1.9, -1.0]."""
+    try:
+        if isinstance(value, list) and value:
+            return [number()(entry) for entry in value]
+        return float(number()(value))
+    except InvalidValue as error:
+        raise InvalidValue(f"{error}, or a list of numbers, as in [-1.9, -1.0]") from None
+
+
 def positive_numbers(value: Any) -> list[float]:
     """One or more numbers above 0, as in [0.1, 0.01]."""
     try:

@@ -66,7 +66,25 @@ def test_standard_deviation_can_depend_on_the_state(tmp_path):
         assert torch.equal(kept.std_net.weight, model.policy.std_net.weight)
 
 
+def test_components_of_the_action_may_explore_differently(tmp_path):
+    kwargs = {"log_std_init": [-1.5, -0.5], "min_std": MIN_STD}
+    model = PPO(BoundedPolicy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
+    expected = MIN_STD + np.exp([-1.5, -0.5])
+    model.policy.save(tmp_path / "policy.pt")
+    for policy in (model.policy, BoundedPolicy.load(tmp_path / "policy.pt")):
+        distribution = policy.get_distribution(policy.obs_to_tensor(model.env.reset())[0])
+        found = distribution.distribution.stddev.detach().numpy()
+        np.testing.assert_allclose(found, np.tile(expected, (4, 1)), rtol=1e-5)
+
+
 def test_a_deviation_that_could_not_be_learned_raises():
+    for wrong in ([-1.0], [-1.0, -1.0, -1.0]):
+        kwargs = {"log_std_init": wrong}
+        with pytest.raises(UsageError, match=r"should be one number or a list of 2, one for each"):
+            PPO(BoundedPolicy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
+    kwargs = {"log_std_init": [-1.0, -7.0], "state_dependent_std": True}
+    with pytest.raises(UsageError, match=r"log_std_init is \[-1.0, -7.0\], should be above -6.0"):
+        PPO(BoundedPolicy, RigidVecEnv(ReachVectorEnv(4)), policy_kwargs=kwargs)
     kwargs = {"log_std_init": 1.0, "state_dependent_std": True}
     with pytest.raises(
         UsageError, match=r"log_std_init is 1.0, should be above -6.0 and below 0.5"
