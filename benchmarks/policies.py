@@ -30,7 +30,7 @@ from training.settings.config_file import load_config
 SHIPPED = Path(__file__).parents[1] / "results"
 ALGORITHMS = ("ppo", "sac")
 EPISODES = 1000
-# steps of a last stage at another preset, as a fraction of those of a whole training
+# least steps of a last stage at another preset, as a fraction of those of a whole training
 LAST_STAGE = 0.1
 TASKS = ("push", "throw", "stack")
 

@@ -50,9 +50,8 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
     from training.settings.config_file import parse_settings
 
     changes = parse_settings(options.hyperparams, "--hyperparams")
-    if options.n_timesteps is not None:
-        config = config.with_steps(options.n_timesteps)
-    for name in ("n_envs", "seed"):
+    own_stage = "finetune_timesteps" in changes
+    for name in ("n_timesteps", "n_envs", "seed"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
     if options.demonstrations is not None:
@@ -62,9 +61,14 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
                 "its own steps only: add --algo sac"
             )
         changes["demonstrations"] = options.demonstrations
-    env_kwargs = env_kwargs_of(options)
-    if env_kwargs:
-        changes["env_kwargs"] = {**config.env_kwargs, **env_kwargs}
+    for name, value in env_kwargs_of(options).items():
+        # what is given holds throughout, also in the last stage and in evaluations
+        for group in ("env_kwargs", "finetune_env_kwargs", "eval_env_kwargs"):
+            own = changes.get(group, getattr(config, group))
+            if group == "env_kwargs" or name in own:
+                changes[group] = {**own, name: value}
+    if "n_timesteps" in changes and not own_stage:
+        return config.with_steps(changes.pop("n_timesteps"), **changes)
     return config.replace(**changes)
 
 

@@ -85,7 +85,8 @@ class Mirrored:
 
     Raises:
         UsageError: A key or a component is unknown, the image of a feature is no feature, the order
-            of two mirrors matters, there is no hidden layer, or one cannot be divided into groups.
+            of two mirrors matters, there is no hidden layer, or one cannot be divided into groups;
+            or components of the action that change places have different `log_std_init`.
 
     Gradients are averaged by hooks, which torch does not copy: save and load a policy instead of
     copying or pickling it.
@@ -133,8 +134,12 @@ def _tie(policy: ActorCriticPolicy, mirrors: Sequence[Mapping[str, Sequence[Entr
     if getattr(policy, "state_dependent_std", False):
         networks[0][1].append((policy.std_net, swapped))
     deviation = Average(swapped)
-    with torch.no_grad():
-        policy.log_std.copy_(deviation(policy.log_std))
+    first = policy.log_std.detach()
+    if not torch.equal(deviation(first), first):
+        raise UsageError(
+            f"log_std_init is {first.tolist()}, should be the same for components of the action "
+            "that change places in a mirror"
+        )
     policy.log_std.register_hook(deviation)
     for hidden, heads in networks:
         if not any(isinstance(layer, torch.nn.Linear) for layer in hidden):

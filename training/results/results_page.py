@@ -187,8 +187,8 @@ def _first_stage(result: Result, settings: TrainConfig) -> str:
     if not settings.finetune_timesteps:
         return f" Trained with {_arguments(changed)}."
     return (
-        f" Trained with {_arguments(changed)} until the fine-tuning stage, the last "
-        f"{settings.finetune_timesteps:,} steps."
+        f" Trained with {_arguments(changed)} until the fine-tuning stage, which starts after "
+        f"{settings.n_timesteps - settings.finetune_timesteps:,} steps or at the target."
     )
 
 

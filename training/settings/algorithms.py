@@ -42,6 +42,7 @@ class PPOConfig(TrainConfig):
     algo: ClassVar[str] = "ppo"
     symlog_policies: ClassVar[tuple[str, ...]] = (*SYMLOG_PPO_POLICIES, PIXEL_POLICY)
     mirrored_policies: ClassVar[tuple[str, ...]] = SYMLOG_PPO_POLICIES
+    bounded_policies: ClassVar[tuple[str, ...]] = BOUNDED_POLICIES
     pixel_policies: ClassVar[tuple[str, ...]] = (PIXEL_POLICY,)
 
     policy: str = setting(choice(*PPO_POLICIES), "MultiInputPolicy")
@@ -73,20 +74,6 @@ class PPOConfig(TrainConfig):
 
     def _check_combinations(self, where: str) -> None:
         super()._check_combinations(where)
-        for name in ("min_std", "state_dependent_std"):
-            if name in self.policy_kwargs and self.policy not in BOUNDED_POLICIES:
-                raise UsageError(
-                    f"{where}: policy_kwargs: {name} requires policy: "
-                    f"{' or '.join(BOUNDED_POLICIES)}"
-                )
-        if (
-            isinstance(self.policy_kwargs.get("log_std_init"), list)
-            and self.policy not in BOUNDED_POLICIES
-        ):
-            raise UsageError(
-                f"{where}: policy_kwargs: log_std_init is {self.policy_kwargs['log_std_init']}; "
-                f"a list requires policy: {' or '.join(BOUNDED_POLICIES)}"
-            )
         rollout = self.rollout
         first_stage = -(-(self.n_timesteps - self.finetune_timesteps) // rollout) * rollout
         if self.finetune_timesteps and first_stage >= self.n_timesteps:

@@ -33,8 +33,8 @@ def component_indices(
             chosen, valid = [entry % size], -size <= entry < size
         if not valid:
             raise UsageError(
-                f"{name}: {entry} in {list(listed)}, should be components of the {vector}, "
-                f"{-size} to {size - 1}"
+                f"{name}: {entry} in {list(listed)}, should be one or more components of the "
+                f"{vector}, {-size} to {size - 1}"
             )
         found += chosen
     for component in found:

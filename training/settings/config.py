@@ -52,16 +52,16 @@ NETWORK_RULES = {
     "net_arch": layer_widths,
     "activation": choice("tanh", "relu", "elu"),
     "log_std_init": number_or_numbers,
-    "min_std": number(at_least=0),
-    "state_dependent_std": boolean,
 }
+BOUNDED_RULES = {"min_std": number(at_least=0), "state_dependent_std": boolean}
+"""Further ones, of policies with a bounded mean."""
 SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
 """Further ones, of policies with features on a logarithmic scale, in actor or critic."""
 MIRROR_RULES = {"mirrors": mirror_list}
 """Further ones, of policies that are equivariant under reflections."""
 PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
 """Further ones, of policies that act from pixels."""
-POLICY_RULES = NETWORK_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
+POLICY_RULES = NETWORK_RULES | BOUNDED_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
 """Arguments of VecNormalize that say what is scaled, both true by default."""
 
@@ -75,6 +75,7 @@ class TrainConfig:
     symlog_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of the algorithm's policies with features on a logarithmic scale."""
     mirrored_policies: ClassVar[tuple[str, ...]] = ()
+    bounded_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those whose networks can be equivariant under reflections."""
     pixel_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those of the algorithm's policies that act from pixels."""
@@ -162,17 +163,26 @@ class TrainConfig:
         """A copy with other `values`, validated like those of a file."""
         return self.from_mapping(self.env_id, {**self.as_mapping(), **values}, source)
 
-    def with_steps(self, n_timesteps: int) -> Self:
-        """A run of another length; the fine-tuning stage keeps its part of it.
+    def with_steps(self, n_timesteps: Any, **values: Any) -> Self:
+        """A run of another length, whose fine-tuning stage is longer or shorter in proportion.
 
         A run in which the stage would be shorter than a rollout has none.
+
+        Args:
+            n_timesteps: Environment steps of the run.
+            **values: Other settings, as for `replace`.
+
+        Raises:
+            UsageError: A value is invalid.
         """
-        stage = self.finetune_timesteps * n_timesteps // self.n_timesteps
-        if stage < self.rollout:
-            return self.replace(
-                n_timesteps=n_timesteps, finetune_timesteps=0, finetune_env_kwargs={}
-            )
-        return self.replace(n_timesteps=n_timesteps, finetune_timesteps=stage)
+        no_stage = {"finetune_timesteps": 0, "finetune_env_kwargs": {}}
+        whole = self.replace(**{**values, **no_stage, "n_timesteps": n_timesteps})
+        stage = self.finetune_timesteps * whole.n_timesteps // self.n_timesteps
+        unchanged = whole.n_timesteps == self.n_timesteps and whole.rollout == self.rollout
+        if stage < whole.rollout and not unchanged:
+            return whole
+        kwargs = values.get("finetune_env_kwargs", self.finetune_env_kwargs)
+        return whole.replace(finetune_timesteps=stage, finetune_env_kwargs=kwargs)
 
     @property
     def rollout(self) -> int:
@@ -233,12 +243,19 @@ class TrainConfig:
         for rules, policies in (
             (SYMLOG_RULES, self.symlog_policies),
             (MIRROR_RULES, self.mirrored_policies),
+            (BOUNDED_RULES, self.bounded_policies),
             (PIXEL_RULES, self.pixel_policies),
         ):
             for name in rules:
                 if name in self.policy_kwargs and self.policy not in policies:
                     required = f"policy: {' or '.join(policies)}" if policies else "algorithm ppo"
                     raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
+        first = self.policy_kwargs.get("log_std_init")
+        if isinstance(first, list) and self.policy not in self.bounded_policies:
+            raise UsageError(
+                f"{where}: policy_kwargs: log_std_init is {first}, should be one number with "
+                f"{self.policy}"
+            )
         if self.norm_obs and symlog:
             only_rewards = " or {norm_obs: false}" if self.algo == "ppo" else ""
             raise UsageError(

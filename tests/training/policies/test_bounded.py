@@ -97,13 +97,22 @@ def test_saved_policy_keeps_its_floor(model, tmp_path):
     assert PPO.load(tmp_path / "model.zip").policy.min_std == MIN_STD
 
 
-def test_run_folder_stores_the_policy_class_and_other_classes_reject_min_std(quick_ppo, tmp_path):
+def test_run_folder_stores_the_policy_class_and_other_classes_reject_min_std(
+    quick_ppo, quick_sac, tmp_path
+):
     config = quick_ppo.replace(policy=BOUNDED_POLICY, policy_kwargs={"min_std": MIN_STD})
     folder = train(config, tmp_path, quiet=True).folder
     assert folder.config() == config
     for name, value in (("min_std", MIN_STD), ("state_dependent_std", True)):
         with pytest.raises(UsageError, match=rf"{name} requires policy: .*Bounded"):
             quick_ppo.replace(policy_kwargs={name: value})
+    several = {"log_std_init": [-1.0, -0.5]}
+    assert config.replace(policy_kwargs=several).policy_kwargs == several
+    for other in (quick_ppo, quick_sac):
+        with pytest.raises(UsageError, match=r"is \[-1.0, -0.5\], should be one number with Multi"):
+            other.replace(policy_kwargs=several)
+        with pytest.raises(UsageError, match=r"log_std_init is a number, or a list of numbers, as"):
+            other.replace(policy_kwargs={"log_std_init": ["x"]})
 
 
 def test_other_action_bounds_raise():

@@ -238,11 +238,11 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
     for mirrors, message in (
         (
             [{"observation": [5]}],
-            r"mirrors: 5 in \[5\], should be components of the observation, -5 to 4",
+            r"mirrors: 5 in \[5\], should be one or more components of the observation, -5 to 4",
         ),
         (
             [{"goal": [2]}],
-            r"mirrors: 2 in \[2\], should be components of the desired goal, -2 to 1",
+            r"mirrors: 2 in \[2\], should be one or more components of the desired goal, -2 to 1",
         ),
         ([{"actions": [-4]}], r"mirrors: -4 in \[-4\], .* of the action, -3 to 2"),
         (
@@ -260,7 +260,10 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
         ([{"observation": ["0:2", 1]}], "lists component 1 of the observation twice"),
         ([{"goal": [[0, 1], [1, 0]]}], "lists component 0 of the desired goal twice"),
         ([{"actions": [[2, 2]]}], "lists component 2 of the action twice"),
-        ([{"observation": ["5:7"]}], r"5:7 in \['5:7'\], should be components of the obs"),
+        (
+            [{"observation": ["5:7"]}],
+            r"5:7 in \['5:7'\], should be one or more components of",
+        ),
         ([{"actions": [0]}], "no feature changes in a mirror, so no action could"),
         ([{"action": [0]}], "key 'action', should be 'observation', 'goal' or 'actions'"),
     ):
@@ -272,6 +275,9 @@ def test_wrong_mirrors_raise(quick_ppo, quick_sac):
     ):
         with pytest.raises(UsageError, match=message):
             policy(net_arch=net_arch)
+    with pytest.raises(UsageError, match=r"is \[-1.0, -2.0, -1.0\], should be the same for comp"):
+        policy(log_std_init=[-1.0, -2.0, -1.0])
+    assert policy(log_std_init=[-1.0, -1.0, -2.0]).log_std.tolist() == [-1.0, -1.0, -2.0]
     with pytest.raises(UsageError, match="requires that differences lists no pair twice"):
         policy(differences=[[2, 0], [0, 2], [3, 1], [1, 3]])
     for config in (quick_ppo, quick_sac):

@@ -105,7 +105,7 @@ def test_page_shows_the_arguments_before_fine_tuning(repository, runs, quick_ppo
     (first / "config.yaml").write_text(config.as_yaml())
     update(repository, first)
     page = (repository / "docs/results.md").read_text()
-    stage = "Trained with `max_episode_steps: 9` until the fine-tuning stage, the last 80 steps."
+    stage = "Trained with `max_episode_steps: 9` until the fine-tuning stage, which starts after 8"
     assert stage in page
 
 

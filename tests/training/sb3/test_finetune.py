@@ -139,5 +139,9 @@ def test_the_stage_keeps_its_part_of_a_run_of_another_length(quick_ppo, quick_sa
         assert config.with_steps(least).finetune_timesteps == config.rollout
         short = config.with_steps(least - 1)
         assert (short.finetune_timesteps, short.finetune_env_kwargs) == (0, {})
+    # a rollout of 160 steps is the least stage of other settings
+    wider = ppo.with_steps(800, n_steps=20)
+    assert (wider.n_timesteps, wider.finetune_timesteps) == (800, 200)
+    assert ppo.with_steps(400, n_steps=20).finetune_timesteps == 0
     with pytest.raises(UsageError, match="n_timesteps is 0, should be an integer of at least 1"):
         ppo.with_steps(0)
