@@ -31,8 +31,8 @@ HELD_OFFSET, HELD_HEIGHT = 0.05, 0.08
 # dense reward: weights of the next cube's terms within `stage`, and of those of a finished tower
 STAGE_WEIGHTS = {"reach": 0.15, "grasp": 0.1, "place": 0.4, "release": 0.35}
 RETREAT_WEIGHT, PRECISION_WEIGHT = 0.3, 0.5
-# `place` of a cube that is not held, relative to that of one that is: a hand that may push cubes as
-# well as carry them learns late to lift one
+# `place` of a cube that is not held, relative to that of one that is: cubes are to be carried, as a
+# cube that is pushed along the ground cannot be placed on another (chosen by a few trials)
 PUSHED = 0.2
 RETREAT = 0.1  # m above the place of the top cube at which `retreat` is 1
 DECAY_LENGTH = 0.15  # m of path after which `reach` and `place` fall to 1/e

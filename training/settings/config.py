@@ -75,8 +75,9 @@ class TrainConfig:
     symlog_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of the algorithm's policies with features on a logarithmic scale."""
     mirrored_policies: ClassVar[tuple[str, ...]] = ()
-    bounded_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those whose networks can be equivariant under reflections."""
+    bounded_policies: ClassVar[tuple[str, ...]] = ()
+    """Import paths of those whose mean action stays within ±1."""
     pixel_policies: ClassVar[tuple[str, ...]] = ()
     """Import paths of those of the algorithm's policies that act from pixels."""
 
