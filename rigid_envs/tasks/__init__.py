@@ -1,4 +1,4 @@
-"""The tasks, one per file: initial state, actions, observation, goal and reward terms in NumPy."""
+"""The tasks: initial state, actions, observation, goal and reward terms in NumPy."""
 
 from rigid_envs.tasks.push import Push
 from rigid_envs.tasks.push_t import PushT

@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.tasks.stack import (
-    CELL,
-    HALF,
-    HELD_HEIGHT,
-    HELD_OFFSET,
-    JITTER,
-    THRESHOLD,
-    Stack,
-    path_length,
-)
+from rigid_envs.tasks.stack import Stack
+from rigid_envs.tasks.stack.reward import path_length
+from rigid_envs.tasks.stack.starts import CELL, HELD_HEIGHT, HELD_OFFSET, JITTER
+from rigid_envs.tasks.stack.tower import HALF, THRESHOLD
 from tests.rigid_envs.rollout import PRESETS, STACK, make, make_vec, random_actions, steps_of
 from training.scripted import controller_for
 

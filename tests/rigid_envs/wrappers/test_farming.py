@@ -15,7 +15,8 @@ from gymnasium.vector import VectorEnv
 
 from rigid_envs.tasks import push, throw
 from rigid_envs.tasks.goals import distance
-from rigid_envs.tasks.stack import HALF, THRESHOLD, Stack
+from rigid_envs.tasks.stack import Stack
+from rigid_envs.tasks.stack.tower import HALF, THRESHOLD
 from rigid_envs.wrappers import Stage, goal_potential
 from rigid_envs.wrappers.vector import (
     ActionPenalty,
