@@ -11,6 +11,7 @@ benchmarks/results.json.
 import argparse
 from collections.abc import Callable
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +23,14 @@ from physics import PRESETS
 from training.policies.policy import Policy
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate
+from training.results.result import read_results
 from training.runs.run_folder import RunFolder
+from training.sb3.model_state import read_state
 from training.sb3.train import resume, train
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 
-SHIPPED = Path(__file__).parents[1] / "results"
-ALGORITHMS = ("ppo", "sac")
+REPOSITORY = Path(__file__).parents[1]
 EPISODES = 1000
 # least steps of a last stage at another preset, as a fraction of those of a whole training
 LAST_STAGE = 0.1
@@ -55,25 +57,20 @@ def finished_at(task: str, first: str, last: str) -> TrainConfig:
 
 
 def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
-    """A finished run in a folder, and its wall time in s; it is trained or resumed if needed.
+    """A finished run with these settings, and its wall time in s; trained or resumed if needed.
 
-    The wall time is kept beside the run once it has finished.
+    Runs in the folder with other settings are left alone.
 
     Raises:
         KeyboardInterrupt: the training was interrupted.
     """
-    runs = sorted(folder.rglob("config.yaml"))
-    if not runs:
-        result = train(config, folder, quiet=True)
-    else:
-        run = RunFolder(runs[0].parent)
-        summary = run.path / "seconds.txt"
-        if summary.exists():
-            return run, float(summary.read_text())
-        result = resume(run, quiet=True)
+    runs = [RunFolder(file.parent) for file in sorted(folder.rglob("run.json"))]
+    same = [run for run in runs if run.checkpoints() and run.config() == config]
+    if same and (state := read_state(same[-1].checkpoint))["finished"]:
+        return same[-1], float(state["seconds"])
+    result = resume(same[-1], quiet=True) if same else train(config, folder, quiet=True)
     if result.interrupted:
         raise KeyboardInterrupt
-    (result.folder.path / "seconds.txt").write_text(f"{result.seconds:.1f}")
     return result.folder, result.seconds
 
 
@@ -84,25 +81,20 @@ def success(policy: Policy, preset: str, episodes: int = EPISODES) -> float:
 
 
 def shipped() -> Table:
-    """Success of the policies in results/: those of an algorithm share the episodes of a row."""
+    """Success of the policies in results/: the seeds of a task share the episodes of a row."""
     rows: list[list[Cell]] = []
-    for algorithm in ALGORITHMS:
-        for task in TASKS:
-            name = _id(task).replace("/", "-")
-            files = sorted((SHIPPED / algorithm).glob(f"{name}_seed*/policy.safetensors"))
-            if not files:
-                continue
-            policies = [trained_policy(file) for file in files]
-            last = policies[0].env_kwargs["fidelity"]
-            row: list[Cell] = [f"{task.capitalize()}, {algorithm.upper()}", last]
-            for preset in PRESETS:
-                row.append(
-                    float(np.mean([success(one, preset, EPISODES // 3) for one in policies]))
-                )
-                print(row[0], preset, row[-1], flush=True)
-            rows.append(row)
+    for _, group in groupby(read_results(REPOSITORY), lambda result: result.kind):
+        seeds = list(group)
+        name = seeds[0].title.removeprefix("RigidEnvs/").replace("-v0", "")
+        policies = [trained_policy(one.folder(REPOSITORY) / "policy.safetensors") for one in seeds]
+        row: list[Cell] = [name, policies[0].env_kwargs["fidelity"]]
+        for preset in PRESETS:
+            rates = [success(one, preset, EPISODES // len(policies)) for one in policies]
+            row.append(float(np.mean(rates)))
+            print(name, preset, row[-1], flush=True)
+        rows.append(row)
     columns = ["policy", "trained at", *(f"success at {name}" for name in PRESETS)]
-    title = f"The policies in results/, {EPISODES // 3} episodes of each of 3 seeds"
+    title = f"The policies in results/, {EPISODES:,} episodes divided among the seeds"
     return Table("policies", title, columns, rows)
 
 

@@ -101,7 +101,11 @@ class Slide(Task):
         stop = achieved.astype(float)
         stop[:, :2] += velocity * speed / (2.0 * self._friction(world) * GRAVITY)
         from_goal = achieved - desired
-        behind = achieved + from_goal * ((RADIUS + Finger.RADIUS) / goal_distance)[:, None]
+        radius = np.full(len(achieved), RADIUS)
+        if world.features.per_world_parameters:
+            radius *= world.parameters.size[:, 0]
+        length = np.maximum(goal_distance, 1e-9)  # at the goal any point is behind
+        behind = achieved + from_goal * ((radius + Finger.RADIUS) / length)[:, None]
         reach = distance(self.finger.position(now), behind)
         gone = achieved[:, 0] > self.finger.high[0]
         return {"aim": -distance(stop, desired), "reach": np.where(gone, 0.0, -reach)}

@@ -35,8 +35,11 @@ class Demand:
 
     @classmethod
     def of(cls, num_threads: int, device: str) -> "Demand":
-        """The demand of training with this number of threads and on this torch device."""
-        return cls(num_threads, 0 if device == "cpu" else 1)
+        """The demand of training with this number of threads and on this torch device.
+
+        "auto" demands no GPU: a task then sees none, and trains on the CPU.
+        """
+        return cls(num_threads, 1 if device.startswith("cuda") else 0)
 
     def options(self) -> dict[str, object]:
         """Options of a Ray task; the tasks are spread over the nodes, and Ray repeats none."""
@@ -70,7 +73,9 @@ class Demand:
         slots = 0
         for node in ray.nodes():
             if node["Alive"]:
-                slots += int(node["Resources"].get("CPU", 0)) // self.threads
+                free = node["Resources"]
+                fit = int(free.get("CPU", 0)) // self.threads
+                slots += min(fit, int(free.get("GPU", 0)) // self.gpus) if self.gpus else fit
         return max(slots, 1)
 
 

@@ -13,13 +13,13 @@ from training.commands.options import (
     check_resumable,
     check_seeds,
     config_of,
-    config_of_file,
     env_kwargs_of,
     policy_of,
     run_folder_of,
 )
 from training.commands.shared_flags import DEFAULT_ENV
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import DATASET, EVALUATION
 
 INTERRUPTED = 130
 """Exit status of a command that was ended by Ctrl-C, by the convention of shells."""
@@ -67,8 +67,9 @@ def evaluate(options: argparse.Namespace) -> int:
     from training.results import evaluate as evaluation
 
     policy = policy_of(options)
-    seed = evaluation.FIRST_SEED if options.seed is None else options.seed
-    result = evaluation.evaluate(policy, options.n_episodes, seed=seed, **env_kwargs_of(options))
+    seed = EVALUATION if options.seed is None else options.seed
+    kwargs = env_kwargs_of(options, evaluation.evaluate)
+    result = evaluation.evaluate(policy, options.n_episodes, seed=seed, **kwargs)
     evaluation.print_evaluation(policy, result)
     return 0
 
@@ -86,7 +87,7 @@ def tune_fidelity(options: argparse.Namespace) -> int:
     try:
         tuned = fidelity_tuning.run(
             policy_of(options), options.tolerance, options.metric, options.time, options.law,
-            options.seed or 0, **env_kwargs_of(options),
+            options.seed or 0, **env_kwargs_of(options, fidelity_tuning.run),
         )  # fmt: skip
     except ValueError as error:
         raise UsageError(str(error)) from None
@@ -96,7 +97,6 @@ def tune_fidelity(options: argparse.Namespace) -> int:
 def record(options: argparse.Namespace) -> int:
     """Records a video of a policy."""
     from training.results import video
-    from training.results.evaluate import FIRST_SEED
 
     policy = policy_of(options)
     given = Path(options.policy) if options.policy else None
@@ -109,8 +109,8 @@ def record(options: argparse.Namespace) -> int:
         policy,
         options.output or default,
         episodes=options.n_episodes,
-        seed=FIRST_SEED if options.seed is None else options.seed,
-        **env_kwargs_of(options),
+        seed=EVALUATION if options.seed is None else options.seed,
+        **env_kwargs_of(options, video.record),
     )
     print(f"video       {path}\nstill image {still}")
     return 0
@@ -154,21 +154,22 @@ def play(options: argparse.Namespace) -> int:
     arguments = {name: value for name, value in flags.items() if value is not None}
     if options.env_kwargs:
         require("train", ("yaml",))
-        arguments = {**env_kwargs_of(options), **arguments}
+        arguments = {**env_kwargs_of(options, game.play), **arguments}
     game.play(options.env, seed=options.seed, **arguments)
     return 0
 
 
 def view(options: argparse.Namespace) -> int:
     """Serves a page that shows many worlds."""
-    arguments = {} if options.fidelity is None else {"fidelity": options.fidelity}
     if options.policy is not None or options.env_kwargs:
         require("train", ("yaml",))
-        arguments = env_kwargs_of(options)
-    policy = policy_of(options) if options.policy is not None else None
 
     from training.commands import view as viewer
 
+    arguments = {} if options.fidelity is None else {"fidelity": options.fidelity}
+    if options.policy is not None or options.env_kwargs:
+        arguments = env_kwargs_of(options, viewer.view)
+    policy = policy_of(options) if options.policy is not None else None
     viewer.view(
         options.env or (policy.env_id if policy else DEFAULT_ENV),
         policy,
@@ -229,7 +230,7 @@ def dataset(options: argparse.Namespace) -> int:
     """Records a dataset of episodes."""
     from training.datasets import minari_store
 
-    kwargs = env_kwargs_of(options)
+    kwargs = env_kwargs_of(options, minari_store.write_dataset)
     if options.policy == minari_store.RANDOM:
         policy = minari_store.random_policy(options.env or DEFAULT_ENV, options.seed or 0, **kwargs)
     else:
@@ -238,7 +239,7 @@ def dataset(options: argparse.Namespace) -> int:
         policy,
         options.n_episodes,
         options.dataset_id,
-        seed=minari_store.FIRST_SEED if options.seed is None else options.seed,
+        seed=DATASET if options.seed is None else options.seed,
         action_noise=options.action_noise,
         slowdown=options.slowdown,
         replace_existing=options.replace,
@@ -262,7 +263,7 @@ def tune(options: argparse.Namespace) -> int:
     steps = config.n_timesteps
     if not options.n_timesteps:
         steps = max(1, config.n_timesteps // tuning.STEPS_DIVISOR)
-    full = config_of_file(options)
+    full = config_of(argparse.Namespace(**{**vars(options), "n_timesteps": None}))
     restored: dict[str, Any] = {}
     if isinstance(full, SACConfig) and "learning_starts" not in parse_settings(
         options.hyperparams, "--hyperparams"

@@ -4,6 +4,8 @@ Like the command line, this module imports neither Stable-Baselines3 nor torch.
 """
 
 import argparse
+import inspect
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,34 +17,23 @@ if TYPE_CHECKING:
     from training.runs.run_folder import RunFolder
     from training.settings.config import TrainConfig
 
-# names that --env-kwargs must not contain, because a command or one of its functions uses them, and
-# the alternative
+# names that --env-kwargs must not contain, because the commands set them, and the alternative
 RESERVED = {
     "seed": "use --seed",
-    "episodes": "use --n-episodes",
     "num_envs": "use --n-envs of train or --num-worlds of view",
     "env_id": "use --env, or for play the first argument",
     "render_mode": "the command sets it",
     "autoreset_mode": "the command sets it",
     "vectorization_mode": "the command sets it",
-    "fps": "it is always 25",
-    "policy": "use the first argument",
-    "video": "use --output",
-    "quiet": "there is no such option",
-    "gif_width": "there is no such option",
 }
 
 
 def config_of(options: argparse.Namespace) -> "TrainConfig":
     """The settings of the file, with those of the flags in their place."""
-    return _with_flags(config_of_file(options), options)
-
-
-def config_of_file(options: argparse.Namespace) -> "TrainConfig":
-    """The settings of the file."""
     from training.settings.config_file import load_config
 
-    return load_config(options.algo or DEFAULT_ALGO, options.env or DEFAULT_ENV, options.config)
+    config = load_config(options.algo or DEFAULT_ALGO, options.env or DEFAULT_ENV, options.config)
+    return _with_flags(config, options)
 
 
 def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainConfig":
@@ -108,18 +99,26 @@ def check_resumable(options: argparse.Namespace) -> None:
             )
 
 
-def env_kwargs_of(options: argparse.Namespace) -> dict[str, Any]:
+def env_kwargs_of(
+    options: argparse.Namespace, function: Callable[..., Any] | None = None
+) -> dict[str, Any]:
     """Arguments of the environment from --env-kwargs and --fidelity.
 
+    Args:
+        options: The parsed options.
+        function: What they are passed to, among arguments of its own.
+
     Raises:
-        UsageError: A name is reserved for the command.
+        UsageError: A name is reserved for the command, or is an argument of the function itself.
     """
     from training.settings.config_file import parse_settings
 
     given = parse_settings(options.env_kwargs, "--env-kwargs")
+    own = inspect.signature(function).parameters if function is not None else ()
     for name in given:
-        if name in RESERVED:
-            raise UsageError(f"--env-kwargs: {name!r} is not allowed here: {RESERVED[name]}")
+        if name in RESERVED or name in own:
+            hint = RESERVED.get(name, "it is no argument of the environment")
+            raise UsageError(f"--env-kwargs: {name!r} is not allowed here: {hint}")
     fidelity = {} if options.fidelity is None else {"fidelity": options.fidelity}
     return {**given, **fidelity}
 
@@ -130,7 +129,9 @@ def policy_of(options: argparse.Namespace) -> "Policy":
     from training.policies.trained_policy import SHIPPED, shipped_policy, trained_policy
 
     if options.policy == SCRIPTED:
-        return scripted_policy(options.env or DEFAULT_ENV, **env_kwargs_of(options))
+        return scripted_policy(
+            options.env or DEFAULT_ENV, **env_kwargs_of(options, scripted_policy)
+        )
     if options.policy == SHIPPED:
         return shipped_policy(options.env or DEFAULT_ENV)
     return trained_policy(

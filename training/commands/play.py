@@ -40,7 +40,8 @@ def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: fl
 
     Args:
         held: Names of the keys.
-        components: Number of components of the action: displacement along x, y, z, then grip.
+        components: Number of components of the action: displacement along x and y, perhaps along z,
+            perhaps grip.
         closed: Whether to close the gripper.
         azimuth: Azimuth of the camera in degrees; keys move along the axis that is nearest to the
             direction in the frame.
@@ -56,7 +57,7 @@ def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: fl
     cos, sin = np.round(np.cos(turn)), np.round(np.sin(turn))
     move = np.array([cos * right - sin * away, sin * right + cos * away, up])
     action = np.zeros(components, dtype=np.float32)
-    action[:3] = (FAST_PACE if held.intersection(FAST) else PACE) * move
+    action[:3] = (FAST_PACE if held.intersection(FAST) else PACE) * move[:components]
     action[3:] = -1.0 if closed else 1.0
     return action
 

@@ -2,11 +2,13 @@
 
 import argparse
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import LIMIT
 
 if TYPE_CHECKING:
     from training.runs.run_folder import RunFolder
@@ -14,9 +16,6 @@ if TYPE_CHECKING:
 
 MOST_SEEDS = 1000
 """Largest number of runs of a command: more are a slip of the pen."""
-
-SEED_LIMIT = 2**32
-"""Upper bound of NumPy's seeds."""
 
 
 def seeds(text: str) -> tuple[int, ...]:
@@ -34,8 +33,8 @@ def seeds(text: str) -> tuple[int, ...]:
                 f'{text[:60]!r}: {part[:60]!r} should be a seed or a range, as in "0-9" or "0-2,5"'
             )
         first, last = int(bounds[1]), int(bounds[2] or bounds[1])
-        if max(first, last) >= SEED_LIMIT:
-            raise argparse.ArgumentTypeError(f"{text!r}: {part!r} should be below {SEED_LIMIT}")
+        if max(first, last) >= LIMIT:
+            raise argparse.ArgumentTypeError(f"{text!r}: {part!r} should be below {LIMIT}")
         if last < first:
             raise argparse.ArgumentTypeError(
                 f"{text!r}: the range {part!r} is empty, should be {last}-{first}"
@@ -86,7 +85,7 @@ def train_seeds(
         print_training(result)
         if interrupted := result.interrupted:
             break
-    _report(failures, len(seeds))
+    _report(failures, len(seeds), interrupted)
     return interrupted
 
 
@@ -126,11 +125,15 @@ def train_on_ray(
         outcome = train_runs(folders, **machine)
     for result in outcome.results:
         print_training(result)
-    _report(outcome.failures, len(folders))
+    _report(outcome.failures, len(folders), outcome.interrupted)
     return outcome.interrupted
 
 
-def _report(failures: Sequence[str], runs: int) -> None:
-    """Raises UsageError if runs have failed."""
-    if failures:
-        raise UsageError(f"{len(failures)} of {runs} runs failed: {'; '.join(failures)}")
+def _report(failures: Sequence[str], runs: int, interrupted: bool) -> None:
+    """Raises UsageError if runs have failed; after Ctrl-C only prints which ones."""
+    if not failures:
+        return
+    text = f"{len(failures)} of {runs} runs failed: {'; '.join(failures)}"
+    if not interrupted:
+        raise UsageError(text)
+    print(text, file=sys.stderr)

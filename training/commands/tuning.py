@@ -22,6 +22,7 @@ from training.sb3.checks import check_settings
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
 from training.settings.search_space import draw, with_drawn
+from training.settings.seed_ranges import LIMIT
 
 STEPS_DIVISOR = 10
 """By default a trial has this fraction, a tenth, of the steps in the settings."""
@@ -29,8 +30,6 @@ WARMUP_REPORTS = 2
 """Number of first comparisons that do not stop a trial: early success rates mean little."""
 STARTUP_TRIALS = 5
 """Number of complete trials before any is stopped: the median of fewer trials means little."""
-SEED_LIMIT = 2**32
-"""Upper bound of the sampler's seed."""
 FAILURE = "failure"
 """Attribute of a trial that diverged. Interrupted trials do not have it and are repeated."""
 
@@ -199,8 +198,8 @@ def _success(
 
 def _settings(config: TrainConfig, trial: optuna.Trial) -> TrainConfig:
     """The settings of a trial."""
-    drawn = with_drawn(config, draw(config.algo, trial))
-    seed = (config.seed or 0) + trial.number
+    drawn = with_drawn(config, draw(config, trial))
+    seed = ((config.seed or 0) + trial.number) % LIMIT
     return drawn.replace("search", seed=seed, target_success_rate=None, eval_freq=0)
 
 
@@ -239,7 +238,7 @@ def _study(
     identity = {"algo": config.algo, "env_id": config.env_id, "episodes": episodes}
     _check_same_settings(study, {**config.as_mapping(), **identity})
     # another seed at each call, otherwise the same values would be sampled again
-    seed = ((config.seed or 0) + len(study.trials)) % SEED_LIMIT
+    seed = ((config.seed or 0) + len(study.trials)) % LIMIT
     running = any(trial.state == TrialState.RUNNING for trial in study.trials)
     # a process that runs at the same time may have the same number of trials: no seed then
     study.sampler = optuna.samplers.TPESampler(

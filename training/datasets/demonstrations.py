@@ -49,8 +49,10 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
 
 
 def _recorded(episode: Any) -> Recorded:
-    actions = np.asarray(episode.actions)
-    intended = episode.infos.get("intended_action")
+    actions, infos = np.asarray(episode.actions), episode.infos or {}
+    intended = infos.get("intended_action")
+    if "is_success" not in infos:
+        raise ValueError("its episodes have no infos['is_success']")
     return Recorded(
         seed=-1,
         observations={key: np.asarray(values) for key, values in episode.observations.items()},
@@ -59,7 +61,7 @@ def _recorded(episode: Any) -> Recorded:
         rewards=np.asarray(episode.rewards),
         terminated=np.asarray(episode.terminations, dtype=bool),
         truncated=np.asarray(episode.truncations, dtype=bool),
-        success=np.asarray(episode.infos["is_success"], dtype=bool),
+        success=np.asarray(infos["is_success"], dtype=bool),
     )
 
 
@@ -72,12 +74,17 @@ def _check(config: SACConfig, spec: Any, episodes: list[Recorded]) -> None:
     with closing(make_single_env(config.env_id, **config.env_kwargs)) as env:
         spaces: Any = env.observation_space
         own: Any = env.spec
+        action = env.action_space.shape
     reward_type, given = (one.kwargs.get("reward_type", "sparse") for one in (own, spec))
     if given != reward_type:
         raise UsageError(
             f"{start} the {given} reward; training has the {reward_type} one: record it with "
             f"--env-kwargs reward_type:{reward_type}"
         )
+    if not episodes:
+        raise UsageError(f"{start} no episodes: record some with `rigid-envs dataset`")
+    if (size := episodes[0].actions.shape[1:]) != action:
+        raise UsageError(f"{start} actions of shape {size}; those of training have {action}")
     found = {key: values.shape[1:] for key, values in episodes[0].observations.items()}
     wanted = {key: space.shape for key, space in spaces.items()}
     if found != wanted:

@@ -6,8 +6,9 @@ and actions are stored bit for bit, so playing an episode's actions after `reset
 the same observations again.
 """
 
+import os
 import re
-import shutil
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -20,22 +21,25 @@ from typing import Any
 import minari
 import numpy as np
 from minari.data_collector import EpisodeBuffer
+from minari.namespace import create_namespace, list_local_namespaces
 from minari.storage import get_dataset_path
 
 from training.datasets.record import Recorded, record_episodes
 from training.policies.episodes import play_episodes
 from training.policies.policy import Policy, scripted_policy
+from training.policies.trained_policy import SHIPPED
 from training.settings.environments import make_single_env, make_vector_env
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import DATASET
 
 Array = np.ndarray
 
-FIRST_SEED = 2_000_000
-"""Far from the seeds of training and evaluation."""
 RANDOM = "random"
 WORLDS = 1024
 REFERENCE_EPISODES = 100
-_NAME = re.compile(r"(?:[-_\w]+/)*[-_\w]+-v\d+")
+FOLDER = "MINARI_DATASETS_PATH"
+"""Environment variable with Minari's folder of datasets."""
+_NAME = re.compile(r"(?:[-\w]{2,}/)*[-\w]+-v\d+", re.ASCII)  # what Minari can read back
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,8 @@ def default_id(env_id: str, policy: str, action_noise: float = 0.0, slowdown: fl
     """The name of a dataset, as rigid-envs/push-dense/scripted-v0 or .../scripted-noise-0-06-v0."""
     name = env_id.rpartition("/")[2].rpartition("-v")[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
-    algorithm = re.sub(r"[^-\w]+", "-", policy.partition(" ")[0]).strip("-").lower()
+    algorithm = SHIPPED if policy.startswith(f"{SHIPPED}-") else policy.partition(" ")[0]
+    algorithm = re.sub(r"[^-\w]+", "-", algorithm).strip("-").lower()
     for word, value in (("noise", action_noise), ("slowdown", slowdown)):
         algorithm += re.sub(r"[^\w]+", "-", f"-{word}-{float(value)!r}") if value else ""
     return f"rigid-envs/{words}/{algorithm}-v0"
@@ -105,11 +110,10 @@ def write_dataset(
     episodes: int,
     dataset_id: str | None = None,
     *,
-    seed: int = FIRST_SEED,
+    seed: int = DATASET,
     action_noise: float = 0.0,
     slowdown: float = 0.0,
     replace_existing: bool = False,
-    report: Callable[[int], None] = lambda _: None,
     **env_kwargs: Any,
 ) -> Written:
     """Plays the episodes with the seeds seed, seed + 1, ... and writes them to Minari's folder.
@@ -128,7 +132,6 @@ def write_dataset(
             1 - slowdown to 1, before the noise. So the episodes also show what to do where the hand
             is slow or at rest.
         replace_existing: whether a dataset of this name may be replaced.
-        report: called with the number of episodes that have ended.
         env_kwargs: arguments of the environment that replace those of the policy.
 
     Raises:
@@ -147,13 +150,17 @@ def write_dataset(
         name = default_id(policy.env_id, policy.name, action_noise, slowdown)
     if not _NAME.fullmatch(name):
         raise UsageError(
-            f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0"
+            f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0: parts "
+            "of at least two letters, digits, - or _, and a version"
         )
-    arguments = {**policy.env_kwargs, **env_kwargs}
-    with _place(name, replace_existing) as path:
-        recorded = _play(policy, episodes, seed, (action_noise, slowdown), arguments, report)
-        low, high = _scores(policy, arguments)
-        _write(name, policy, (action_noise, slowdown), arguments, recorded, low, high)
+    _check_free(name, replace_existing)
+    arguments, disturbance = {**policy.env_kwargs, **env_kwargs}, (action_noise, slowdown)
+    recorded = _play(policy, episodes, seed, disturbance, arguments)
+    low, high = _scores(policy, arguments)
+    path = _placed(
+        name, replace_existing,
+        lambda: _write(name, policy, disturbance, arguments, recorded, low, high),
+    )  # fmt: skip
     returns = [float(one.rewards.sum(dtype=float)) for one in recorded]
     return Written(
         name, path, episodes, sum(len(one.rewards) for one in recorded),
@@ -168,7 +175,6 @@ def _play(
     seed: int,
     disturbance: tuple[float, float],
     arguments: dict[str, Any],
-    report: Callable[[int], None],
 ) -> list[Recorded]:
     worlds, draw = min(episodes, WORLDS), np.random.default_rng(seed)
     noise, slowdown = disturbance
@@ -182,7 +188,7 @@ def _play(
     with closing(make_vector_env(policy.env_id, worlds, **arguments)) as envs:
         moves = np.array([name != "grip" for name in envs.task.actions])  # type: ignore[attr-defined]
         for first in range(0, episodes, worlds):
-            recorded += record_episodes(envs, policy.act, seed + first, report, disturb)
+            recorded += record_episodes(envs, policy.act, seed + first, disturb)
     return recorded[:episodes]
 
 
@@ -205,7 +211,7 @@ def _scores(policy: Policy, arguments: dict[str, Any]) -> tuple[float, float | N
 
 def _mean_return(policy: Policy) -> float:
     with closing(make_vector_env(policy.env_id, REFERENCE_EPISODES, **policy.env_kwargs)) as envs:
-        return float(play_episodes(envs, policy.act, FIRST_SEED).episode_return.mean())
+        return float(play_episodes(envs, policy.act, DATASET).episode_return.mean())
 
 
 def _write(
@@ -257,28 +263,55 @@ def _version() -> str:
         return "0"
 
 
-@contextmanager
-def _place(name: str, replace_existing: bool) -> Iterator[Path]:
-    """The folder of a new dataset. If writing fails nothing is left, and an old one is kept."""
+def _check_free(name: str, replace_existing: bool) -> Path:
+    """The folder of a new dataset.
+
+    Raises:
+        UsageError: it cannot be written, or a dataset of this name exists and must stay.
+    """
     try:
         path = Path(get_dataset_path(name))
     except OSError as error:
         raise UsageError(f"the folder of datasets cannot be written: {error}") from None
-    old = path.with_name(f".{path.name}.old")
-    if path.exists():
-        if not replace_existing:
-            raise UsageError(
-                f"a dataset {name!r} exists, in {path}: choose another --dataset-id, or --replace"
-            )
-        shutil.rmtree(old, ignore_errors=True)
-        path.rename(old)
+    if path.exists() and not replace_existing:
+        raise UsageError(
+            f"a dataset {name!r} exists, in {path}: choose another --dataset-id, or --replace"
+        )
+    return path
+
+
+def _placed(name: str, replace_existing: bool, write: Callable[[], None]) -> Path:
+    """Writes a dataset in a folder that Minari does not list, then moves it to its place.
+
+    So a dataset that is replaced stays until the new one is complete, and nothing of an incomplete
+    one is seen, however this process ends.
+    """
+    path, root = _check_free(name, replace_existing), Path(get_dataset_path())
     try:
-        yield path
-    except BaseException as error:
-        shutil.rmtree(path, ignore_errors=True)
-        if old.exists():
-            old.rename(path)
-        if isinstance(error, OSError):
-            raise UsageError(f"{path} cannot be written: {error}") from None
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+        with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=root) as folder:
+            with _datasets_in(folder):
+                write()
+            namespace = name.rpartition("/")[0]
+            if namespace and namespace not in list_local_namespaces():
+                create_namespace(namespace)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if _check_free(name, replace_existing).exists():  # written meanwhile, or to be replaced
+                path.rename(Path(folder) / "replaced")
+            (Path(folder) / name).rename(path)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error}") from None
+    return path
+
+
+@contextmanager
+def _datasets_in(folder: str) -> Iterator[None]:
+    """Minari's folder of datasets is this one meanwhile."""
+    before = os.environ.get(FOLDER)
+    os.environ[FOLDER] = folder
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[FOLDER]
+        else:
+            os.environ[FOLDER] = before

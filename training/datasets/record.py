@@ -37,7 +37,6 @@ def record_episodes(
     envs: VectorEnv,
     act: Callable[[dict[str, Array]], Array],
     seed: int,
-    advance: Callable[[int], None] = lambda _: None,
     disturb: Callable[[Array], Array] = lambda action: action,
 ) -> list[Recorded]:
     """Plays until the first episode of every world has ended, and returns it.
@@ -46,7 +45,6 @@ def record_episodes(
         envs: vector environment with autoreset mode SAME_STEP.
         act: takes observations, a dict of [n, ...] arrays; returns actions [n, action_dim].
         seed: of the episode of the first world; the following ones count up.
-        advance: called after each step with the number of episodes that ended.
         disturb: what becomes of actions [n, action_dim] that the policy chose.
     """
     count, space = envs.num_envs, envs.action_space
@@ -74,9 +72,7 @@ def record_episodes(
         observations.append(shown)
         success.append(solved)
         steps.append((action, intended, reward.copy(), terminated.copy(), truncated.copy()))
-        first = ended & (length == 0)
-        length[first] = len(steps)
-        advance(int(first.sum()))
+        length[ended & (length == 0)] = len(steps)
     actions, intents, rewards, terminated, truncated = map(np.stack, zip(*steps, strict=True))
     frames = {key: np.stack([o[key] for o in observations]) for key in observations[0]}
     solved = np.stack(success)

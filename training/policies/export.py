@@ -34,26 +34,6 @@ from training.settings.errors import UsageError
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu", torch.nn.ELU: "elu"}
 
 
-def write_policy(
-    path: Path, model: BaseAlgorithm, config: TrainConfig, success: Success | None = None
-) -> None:
-    """Writes a policy file; if that fails, no file is left.
-
-    Args:
-        path: The file.
-        model: A PPO or SAC model, with its observation statistics if it has any.
-        config: Its settings.
-        success: Measured success of the policy, if any.
-
-    Raises:
-        UsageError: The model has parts that a policy file cannot describe.
-        OSError: The file cannot be written.
-    """
-    data = policy_file_of(model, config, success).to_bytes()
-    with atomic_write(path) as file:
-        file.write(data)
-
-
 def export_run(
     folder: RunFolder, output: Path, *, success: Success | None = None, sb3: bool = False
 ) -> list[Path]:
@@ -97,7 +77,16 @@ def export_run(
 def policy_file_of(
     model: BaseAlgorithm, config: TrainConfig, success: Success | None = None
 ) -> PolicyFile:
-    """The content of a policy file; arguments and errors as for `write_policy`."""
+    """The content of a policy file.
+
+    Args:
+        model: A PPO or SAC model, with its observation statistics if it has any.
+        config: Its settings.
+        success: Measured success of the policy, if any.
+
+    Raises:
+        UsageError: The model has parts that a policy file cannot describe.
+    """
     space, actions = model.observation_space, model.action_space
     if not isinstance(space, spaces.Dict) or not isinstance(actions, spaces.Box):
         raise UsageError(

@@ -24,9 +24,8 @@ from training.settings.environments import (
     registered_arguments,
 )
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import EVALUATION
 
-FIRST_SEED = 1_000_000
-"""Far from the seeds of training, which count up from a small number."""
 WORLDS = 1024
 NORMAL_QUANTILE = 1.959963984540054
 """Two-sided 95 %."""
@@ -58,7 +57,7 @@ def evaluate(
     policy: Policy,
     episodes: int = 1000,
     *,
-    seed: int = FIRST_SEED,
+    seed: int = EVALUATION,
     quiet: bool = False,
     **env_kwargs: Any,
 ) -> Evaluation:

@@ -11,7 +11,7 @@ import numpy as np
 from training.policies.export import export_run
 from training.policies.policy_header import Success
 from training.policies.trained_policy import trained_policy
-from training.results.evaluate import FIRST_SEED, evaluate, wilson_interval
+from training.results.evaluate import evaluate, wilson_interval
 from training.results.plot import read_learning_curve
 from training.results.result import RESULT, Result, parse_result, read_results, task_name
 from training.runs.run_folder import RunFolder
@@ -20,6 +20,7 @@ from training.settings.algorithms import SACConfig
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import EVALUATION
 
 MAX_FILE_BYTES = 300_000
 """Largest policy or image, because a git repository stores every version of it."""
@@ -62,7 +63,7 @@ def record_run(
         size = folder.policy.stat().st_size
         raise UsageError(f"its policy has {size:,} bytes, should have at most {MAX_FILE_BYTES:,}")
     policy = trained_policy(folder.path)
-    outcome = evaluate(policy, episodes, seed=FIRST_SEED, quiet=quiet)
+    outcome = evaluate(policy, episodes, seed=EVALUATION, quiet=quiet)
     seconds, resumed = float(state["seconds"]), run.get("resumed", [])
     values = {
         "algorithm": config.algo,
@@ -73,7 +74,7 @@ def record_run(
         "seconds": round(seconds, 3),
         "environment_time_fraction": round(float(state["seconds_in_envs"]) / seconds, 4),
         "episodes": episodes,
-        "first_seed": FIRST_SEED,
+        "first_seed": EVALUATION,
         "fidelity": config.final_env_kwargs.get("fidelity"),
         "success_at_end": _rate(outcome.success_at_end),
         "success_at_any_time": _rate(outcome.success_at_any_time),

@@ -11,11 +11,10 @@ from training.results.evaluate import evaluate
 from training.sb3.progress import success_rate
 from training.sb3.train import train
 from training.settings.config import TrainConfig
+from training.settings.seed_ranges import SEARCH
 
 INTERMEDIATE_REPORTS = 10
 """Number of intervals of a trial; at the end of each but the last, it is compared with others."""
-FIRST_SEED = 2_000_000
-"""First seed of the evaluation, whose episodes differ from those of the recorded results."""
 
 Report = Callable[[float, int], bool]
 """Called with a success rate and the number of the interval; returns whether to stop the trial."""
@@ -78,5 +77,5 @@ def success_of(
         if trained.interrupted:
             raise KeyboardInterrupt
         policy = trained_policy(trained.folder.path)
-        outcome = evaluate(policy, episodes, seed=FIRST_SEED, quiet=True)
+        outcome = evaluate(policy, episodes, seed=SEARCH, quiet=True)
     return float(outcome.success_at_end.mean())

@@ -13,10 +13,10 @@ from rich.progress import track
 
 from rigid_envs.tasks import Task
 from training.policies.policy import Policy
-from training.results.evaluate import FIRST_SEED
 from training.results.gif import WIDTH, GifWriter
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import EVALUATION
 
 DEFAULT_FPS = 25
 SUFFIXES = (".mp4", ".gif")
@@ -29,7 +29,7 @@ def record(
     video: Path,
     *,
     episodes: int = 8,
-    seed: int = FIRST_SEED,
+    seed: int = EVALUATION,
     quiet: bool = False,
     gif_width: int = WIDTH,
     **env_kwargs: Any,

@@ -22,6 +22,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from training.policies.export import policy_file_of
 from training.runs.run_folder import CHECKPOINT, RunFolder, atomic_folder
+from training.sb3.demonstration_buffers import DemonstrationBuffer
 from training.sb3.model_state import REPLAY, state_files, write_replay
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
@@ -62,7 +63,7 @@ def save_checkpoint(
     notes = {"seconds": seconds, "seconds_in_envs": seconds_in_envs, "finished": finished}
     files |= state_files(model, notes)
     model_file = io.BytesIO()
-    model.save(model_file, exclude=TRANSIENT)
+    model.save(model_file, exclude=[*TRANSIENT, *_demonstrations(model)])
     files[folder.model.name] = model_file.getvalue()
     normalization = model.get_vec_normalize_env()
     if normalization is not None:
@@ -88,6 +89,13 @@ def save_checkpoint(
         shutil.rmtree(path, ignore_errors=True)
 
 
+def _demonstrations(model: BaseAlgorithm) -> list[str]:
+    """Attributes that hold the demonstrations; without them an ordinary buffer is built."""
+    if isinstance(getattr(model, "replay_buffer", None), DemonstrationBuffer):
+        return ["replay_buffer_class", "replay_buffer_kwargs"]
+    return []
+
+
 class PeriodicCheckpoint(BaseCallback):
     """Saves between updates, when at least `every` steps have passed since the last checkpoint.
 
@@ -101,20 +109,32 @@ class PeriodicCheckpoint(BaseCallback):
         self.every = every
         self.save = save
         self.next = every
-        self.rollout_from: int | None = None
-        """Number of steps at the start of the current rollout; None between rollouts."""
 
     def _on_training_start(self) -> None:
         self.next = self.model.num_timesteps + self.every
 
     def _on_rollout_start(self) -> None:
-        self.rollout_from = self.model.num_timesteps
         if self.model.num_timesteps >= self.next:
             self.next = self.model.num_timesteps + self.every
             self.save()
 
+    def _on_step(self) -> bool:
+        return True
+
+
+class CurrentRollout(BaseCallback):
+    """Knows the rollout whose steps no update has used. It must be the last of all callbacks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.start: int | None = None
+        """Number of steps at its start; None in an update."""
+
+    def _on_rollout_start(self) -> None:
+        self.start = self.model.num_timesteps
+
     def _on_rollout_end(self) -> None:
-        self.rollout_from = None
+        self.start = None
 
     def _on_step(self) -> bool:
         return True

@@ -83,7 +83,7 @@ def state_to_resume(folder: RunFolder) -> tuple[Path, dict[str, Any]]:
         steps, finished = int(state["steps"]), bool(state["finished"])
     except Exception as error:  # a damaged file can raise any exception
         raise UsageError(f"{checkpoint} is damaged: {error}") from error
-    if finished or steps >= folder.config().n_timesteps:
+    if finished:
         raise UsageError(f"{folder.path} is finished after {steps:,} steps: nothing to resume")
     return checkpoint, dict(state)
 

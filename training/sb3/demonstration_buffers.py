@@ -5,6 +5,7 @@ et al., Efficient online reinforcement learning with offline data, ICML 2023). D
 never overwritten; with HER, their goals are replaced as those of other episodes.
 """
 
+import hashlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -35,6 +36,12 @@ class DemonstrationBuffer(DictReplayBuffer):
         self.demonstrations = self._empty(sum(len(episode.rewards) for episode in episodes))
         _fill(self.demonstrations, episodes)
         self._intended = np.concatenate([episode.intended for episode in episodes])
+        digest = hashlib.sha256()
+        for episode in episodes:
+            for values in (episode.actions, episode.intended, episode.rewards):
+                digest.update(np.ascontiguousarray(values).tobytes())
+        self.fingerprint = digest.hexdigest()
+        """Of the demonstrations, to notice others when a run is resumed."""
 
     def sample_intended(
         self, batch_size: int, env: VecNormalize | None = None

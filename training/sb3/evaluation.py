@@ -8,9 +8,7 @@ from gymnasium.vector import VectorEnv
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training.policies.episodes import play_episodes
-
-FIRST_SEED = 10_000_000
-"""Of the first episode: far from the seeds of training, and from those of `evaluate`."""
+from training.settings.seed_ranges import TRAINING_EVALUATION
 
 
 class SuccessEvaluation(BaseCallback):
@@ -44,7 +42,7 @@ class SuccessEvaluation(BaseCallback):
         self.count = self.num_timesteps // self.every
         if self._envs is None:
             self._envs = self.make()
-        seed = FIRST_SEED + self.count * self._envs.num_envs
+        seed = TRAINING_EVALUATION + self.count * self._envs.num_envs
         episodes = play_episodes(self._envs, self._act, seed)
         self.at_step = self.num_timesteps
         self.rate = float(episodes.success_at_end.mean())

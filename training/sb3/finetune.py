@@ -9,6 +9,7 @@ from gymnasium.vector import VectorEnv
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.her import HerReplayBuffer
 
+from training.sb3.model_state import resumption_seed
 from training.sb3.vec_env import RigidVecEnv
 
 
@@ -46,8 +47,9 @@ class FineTuning(BaseCallback):
             with warnings.catch_warnings():  # it warns that the episodes are cut off, as intended
                 warnings.simplefilter("ignore")
                 buffer.truncate_last_trajectory()
-        if not self.resumed:  # a resumed run would repeat the episodes of this seed
-            self.worlds.seed(self.seed)
+        # a resumed run must not repeat the episodes of the stage's own seed
+        self.worlds.seed(resumption_seed(model) if self.resumed else self.seed)
+        if not self.resumed:
             model.ep_success_buffer.clear()
             model.ep_info_buffer.clear()
         model._last_obs = model.env.reset()

@@ -26,6 +26,9 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from stable_baselines3.her import HerReplayBuffer
 
+from training.sb3.demonstration_buffers import DemonstrationBuffer
+from training.settings.errors import UsageError
+
 STATE, TENSORS, REPLAY = "state.json", "tensors.pt", "replay.npz"
 ROWS = ("actions", "rewards", "dones", "timeouts")
 HINDSIGHT_ROWS = ("ep_start", "ep_length")
@@ -57,6 +60,7 @@ def state_files(model: BaseAlgorithm, notes: dict[str, Any]) -> dict[str, bytes]
             for name, value in model.logger.name_to_value.items()
             if np.isscalar(value) and not isinstance(value, str)
         ],
+        "demonstrations": _fingerprint(model),
         "random": {
             "python": random.getstate(),
             "numpy": [legacy[0], legacy[1].tolist(), *legacy[2:]],
@@ -114,9 +118,16 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
         checkpoint: Folder with the files.
 
     Raises:
+        UsageError: The run has had other demonstrations.
         Exception: Of any type, if the files are damaged or belong to a model with other settings.
     """
     state = read_state(checkpoint)
+    own = _fingerprint(model)
+    if state.get("demonstrations", own) != own:
+        raise UsageError(
+            f"the demonstrations of {checkpoint} have been replaced by other ones: restore the "
+            "dataset, or start a new run"
+        )
     tensors = torch.load(checkpoint / TENSORS, map_location=model.device, weights_only=True)
     model.set_parameters(tensors["parameters"], exact_match=True, device=model.device)
     for name in model._get_torch_save_params()[1]:
@@ -139,9 +150,7 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
     model.ep_info_buffer = deque(state["last_episodes"], maxlen=window)
     model.ep_success_buffer = deque(state["last_successes"], maxlen=window)
     assert model.env is not None
-    # other episodes than at the start of the run, but the same ones at each resumption
-    seed = np.random.SeedSequence([model.seed or 0, state["steps"]]).generate_state(1)
-    model.env.seed(int(seed[0]) // 2)
+    model.env.seed(resumption_seed(model))
     generators = state["random"]
     version, numbers, gauss = generators["python"]
     random.setstate((version, tuple(numbers), gauss))
@@ -149,6 +158,21 @@ def restore(model: BaseAlgorithm, checkpoint: Path) -> None:
     np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = generators["actions"]
     torch.set_rng_state(tensors["random"].cpu())
+
+
+def _fingerprint(model: BaseAlgorithm) -> str | None:
+    """Of the demonstrations; None without any."""
+    buffer = getattr(model, "replay_buffer", None)
+    return buffer.fingerprint if isinstance(buffer, DemonstrationBuffer) else None
+
+
+def resumption_seed(model: BaseAlgorithm) -> int:
+    """The seed of the worlds where a run resumes.
+
+    The episodes are others than at the start of the run, but the same ones at each resumption.
+    """
+    numbers = np.random.SeedSequence([model.seed or 0, model.num_timesteps]).generate_state(1)
+    return int(numbers[0]) // 2
 
 
 def _statistics(env: VecNormalize | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from training.runs.run_folder import RunFolder, create_run_folder
 from training.sb3.bootstrap import BatchedTimeoutBootstrap
 from training.sb3.build import worlds_and_model
-from training.sb3.checkpoint import PeriodicCheckpoint, save_checkpoint
+from training.sb3.checkpoint import CurrentRollout, PeriodicCheckpoint, save_checkpoint
 from training.sb3.checks import checked_worlds_and_model, state_to_resume, with_seed
 from training.sb3.evaluation import SuccessEvaluation
 from training.sb3.finetune import FineTuning
@@ -95,7 +95,7 @@ def train(
             many times as long if another program uses their cores, and round differently.
         save_every: Steps between checkpoints; by default a tenth of the run.
         quiet: Show no progress.
-        callbacks: Additional callbacks, called last in every step.
+        callbacks: Additional callbacks, called after those of training.
         after_checkpoint: Called with the run folder after each checkpoint, also the last one.
 
     Raises:
@@ -146,6 +146,8 @@ def resume(
             try:
                 restore(model, checkpoint)
                 before = _Elapsed.of(state)
+            except UsageError:
+                raise
             except Exception as error:  # a damaged file can raise any exception
                 raise UsageError(f"{checkpoint} is damaged: {error}") from error
             folder.record_resumption(model.num_timesteps)
@@ -188,7 +190,8 @@ def _learn(
 
     progress = TrainingProgress(config.n_timesteps, quiet, before.total)
     checkpoints = PeriodicCheckpoint(save_every or max(config.n_timesteps // 10, 1), save)
-    callbacks = [checkpoints, progress, *_callbacks(config, worlds), *more]
+    rollout = CurrentRollout()
+    callbacks = [checkpoints, progress, *_callbacks(config, worlds), *more, rollout]
     interrupted = False
     try:
         remaining = config.n_timesteps - steps_before
@@ -204,9 +207,9 @@ def _learn(
         ) from None
     except KeyboardInterrupt:
         interrupted = True
-        if isinstance(model, OnPolicyAlgorithm) and checkpoints.rollout_from is not None:
-            # the unfinished rollout is discarded: no update has used its steps
-            model.num_timesteps = checkpoints.rollout_from
+        if isinstance(model, OnPolicyAlgorithm) and rollout.start is not None:
+            # the rollout is discarded: no update has used its steps
+            model.num_timesteps = rollout.start
     finally:
         progress.close()
     total = elapsed()

@@ -7,6 +7,7 @@ from training.settings.config import ACTION_WRAPPERS, TrainConfig
 from training.settings.errors import UsageError
 from training.settings.settings import (
     choice,
+    count_or_all,
     entropy_coefficient,
     integer,
     mapping,
@@ -104,7 +105,7 @@ class SACConfig(TrainConfig):
     """Steps of random actions before the first update; with HER more than one episode."""
     train_freq: int = setting(integer(1), 1)
     """Steps of all worlds between two updates."""
-    gradient_steps: int = setting(integer(-1), 1)
+    gradient_steps: int = setting(count_or_all, 1)
     """Gradient steps in an update; -1 for as many as transitions were collected."""
     tau: float = setting(number(above=0, at_most=1), 0.005)
     """Interpolation factor of the target network's update (Polyak averaging)."""
@@ -142,8 +143,19 @@ class SACConfig(TrainConfig):
                 f"{'false' if self.policy in self.symlog_policies else 'true or false'}: SAC's "
                 "rewards are never scaled"
             )
+        if "log_std_init" in self.policy_kwargs:
+            raise UsageError(
+                f"{where}: policy_kwargs: log_std_init requires algorithm ppo: SAC's networks "
+                "compute the standard deviation"
+            )
         if self.cloning_steps:
             self._check_cloning(where)
+        shown = self.demonstration_batch
+        if self.demonstrations is not None and not 0 < shown < self.batch_size:
+            raise UsageError(
+                f"{where}: demonstration_fraction is {self.demonstration_fraction}, which is "
+                f"{shown} of {self.batch_size} transitions: a batch should have some of each kind"
+            )
         if self.demonstrations is not None and self.env_wrapper is not None:
             raise UsageError(
                 f"{where}: env_wrapper cannot be used with demonstrations, whose rewards are those "

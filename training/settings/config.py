@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Self
 import yaml
 
 from training.settings.errors import UsageError, nearest
+from training.settings.seed_ranges import LIMIT
 from training.settings.settings import (
     MOST_FILTERS,
     InvalidValue,
@@ -112,7 +113,7 @@ class TrainConfig:
     target_success_rate: float | None = setting(optional(number(above=0, at_most=1)), None)
     """Stop early when this fraction of the episodes of an evaluation succeeds. With a fine-tuning
     stage: start that stage early, and stop when the rate is reached in it too."""
-    seed: int | None = setting(optional(integer(0)), 0)
+    seed: int | None = setting(optional(integer(0, LIMIT - 1)), 0)
     """Seed of worlds, network and sampling; null draws one and records it."""
     policy: str = setting(choice("MultiInputPolicy"), "MultiInputPolicy")
     """Policy class of Stable-Baselines3 for dict observations."""

@@ -21,8 +21,8 @@ from training.settings.errors import UsageError, check_exists, nearest
 CONFIG_FOLDER = data_folder("configs", "configs")
 """The packaged settings."""
 SECTIONS = (
-    "eval_env_kwargs", "eval_freq", "target_success_rate", "finetune_timesteps",
-    "finetune_env_kwargs", "cloning_steps", "cloning_weight",
+    "eval_env_kwargs", "eval_freq", "n_eval_episodes", "target_success_rate",
+    "finetune_timesteps", "finetune_env_kwargs", "cloning_steps", "cloning_weight",
 )  # fmt: skip
 """This project's own settings that may be top-level sections of a file."""
 

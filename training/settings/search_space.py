@@ -5,6 +5,7 @@ from typing import Any
 
 import optuna
 
+from training.settings.algorithms import SACConfig
 from training.settings.config import TrainConfig
 
 
@@ -55,9 +56,12 @@ SPACES: dict[str, dict[str, LogUniform | OneOf]] = {
 }
 
 
-def draw(algo: str, trial: optuna.Trial) -> dict[str, Any]:
-    """Samples a value for each row of an algorithm's table."""
-    return {name: row.draw(trial, name) for name, row in SPACES[algo].items()}
+def draw(config: TrainConfig, trial: optuna.Trial) -> dict[str, Any]:
+    """Samples a value for each row of an algorithm's table that has an effect."""
+    rows = dict(SPACES[config.algo])
+    if isinstance(config, SACConfig) and config.cloning_steps:
+        del rows["ent_coef"]  # there is no entropy bonus
+    return {name: row.draw(trial, name) for name, row in rows.items()}
 
 
 def with_drawn(config: TrainConfig, drawn: dict[str, Any]) -> TrainConfig:

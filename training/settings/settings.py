@@ -41,6 +41,16 @@ def integer(at_least: int, at_most: float = math.inf) -> Rule:
     return check
 
 
+def count_or_all(value: Any) -> int:
+    """An integer of at least 1, or -1 for as many as there are."""
+    if value == -1:
+        return -1
+    try:
+        return int(integer(1)(value))
+    except InvalidValue as error:
+        raise InvalidValue(f"{error}, or -1") from None
+
+
 def number(
     above: float = -math.inf, at_least: float = -math.inf, at_most: float = math.inf
 ) -> Rule:
@@ -84,8 +94,9 @@ def entropy_coefficient(value: Any) -> float | str:
     """A number of at least 0; or "auto" or "auto_0.1" to learn it, the latter starting at 0.1."""
     if value == "auto":
         return "auto"
-    if isinstance(value, str) and value.startswith("auto_") and _looks_like_number(value[5:]):
-        return value
+    start = value[5:] if isinstance(value, str) and value.startswith("auto_") else ""
+    if _looks_like_number(start) and float(start) > 0.0:
+        return str(value)
     try:
         return float(number(at_least=0.0)(value))
     except InvalidValue as error:

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from rigid_envs.tasks.finger import Finger
 from rigid_envs.tasks.slide import (
     FRICTION,
     GRAVITY,
     MAX_GOAL_ANGLE,
     MAX_GOAL_DISTANCE,
     MIN_GOAL_DISTANCE,
+    RADIUS,
     START,
     THRESHOLD,
     Slide,
@@ -72,6 +74,21 @@ def test_reach_counts_until_the_puck_has_left_the_workspace():
     world.set_state(position=place)
     info = envs.step(np.zeros((4, 3)))[-1]
     assert (info["reach"] == 0.0).tolist() == [True, True, False, False]
+
+
+def test_reach_leads_behind_the_puck_whatever_its_size_and_is_finite_at_the_goal():
+    envs = make_vec(4, SLIDE, reward_type="dense", randomize={"size": (0.8, 1.2)})
+    envs.reset(seed=0)
+    runner = envs._runner
+    world, task = runner.world, runner.task
+    puck, size = world.position[:, 0], world.parameters.size[:, 0]
+    goal = puck + np.array([0.6, 0.0, 0.0])
+    finger = puck - np.outer(RADIUS * size + Finger.RADIUS, (1.0, 0.0, 0.0))
+    world.set_state(drive_position=finger[:, None])
+    far = task.terms(world, world.read(), puck, goal, np.full(4, 0.6))
+    np.testing.assert_allclose(far["reach"], 0.0, atol=1e-6)
+    there = task.terms(world, world.read(), puck, puck, np.zeros(4))
+    np.testing.assert_allclose(there["reach"], -(RADIUS * size + Finger.RADIUS), rtol=1e-5)
 
 
 def test_blind_steps_stay_physical():

@@ -1,5 +1,6 @@
 """Play: keys move the finger or gripper as the frame shows; closing the window ends the game."""
 
+import gymnasium as gym
 import numpy as np
 import pygame
 import pytest
@@ -253,3 +254,11 @@ def test_play_requires_only_pygame(monkeypatch, capsys):
         "error: this command requires no_such_pygame; "
         'to install, in a clone: pip install -c constraints.txt ".[render]"\n'
     )
+
+
+@pytest.mark.parametrize("env_id", [name for name in gym.registry if name.startswith("RigidEnvs/")])
+def test_every_task_can_be_played(game, env_id):
+    playing = game(env_id)
+    playing.press([Key("right", True), Key("r", True)])
+    playing.step()
+    assert playing.steps == 1

@@ -92,7 +92,7 @@ def test_ctrl_c_keeps_complete_trials(words, tmp_path, monkeypatch, capsys):
 
     def interrupted(config, trial, *rest):
         if trial.number == 1:
-            draw(config.algo, trial)
+            draw(config, trial)
             raise KeyboardInterrupt
         return success(config, trial, *rest)
 
@@ -178,7 +178,7 @@ def test_every_row_of_the_table_gives_valid_settings(algo, quick_ppo, quick_sac,
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     changed = set()
     for _ in range(50):
-        found = with_drawn(config, draw(algo, study.ask())).as_mapping()
+        found = with_drawn(config, draw(config, study.ask())).as_mapping()
         changed |= {name for name, value in config.as_mapping().items() if found[name] != value}
     rows = {"minibatches": "batch_size", "net_arch": "policy_kwargs"}
     assert changed | {"batch_size"} == {rows.get(name, name) for name in SPACES[algo]} | {
@@ -228,3 +228,25 @@ def test_steps_are_a_tenth_of_the_settings_unless_given(words, tmp_path, capsys)
     study = study_of(tmp_path / "ppo" / "Test-Reach-v0_tuning.db")
     assert yaml.safe_load(study.user_attrs["settings"])["n_timesteps"] == 16
     assert "n_timesteps: 160" in capsys.readouterr().out
+
+
+def test_a_search_draws_no_entropy_bonus_where_there_is_none():
+    config = load_config("sac", "RigidEnvs/Stack-v0")
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    for _ in range(10):
+        drawn = draw(config, study.ask())
+        assert "ent_coef" not in drawn
+        assert with_drawn(config, drawn).ent_coef == "auto"
+
+
+def test_flags_hold_in_the_last_stage_of_the_best_settings(monkeypatch, capsys):
+    monkeypatch.setattr(
+        tuning, "tune", lambda config, *_, **__: tuning.Tuned(config, "best", interrupted=False)
+    )
+    words = ["tune", "--env", "RigidEnvs/Stack-v0", "--env-kwargs", "max_episode_steps:50"]
+    assert cli.main([*words, "--hyperparams", "finetune_timesteps:1000000"]) == 0
+    best = next(iter(yaml.safe_load(capsys.readouterr().out).values()))
+    assert best["n_timesteps"] == load_config("ppo", "RigidEnvs/Stack-v0").n_timesteps
+    assert best["finetune_timesteps"] == 1_000_000
+    assert best["env_kwargs"]["max_episode_steps"] == 50
+    assert best["finetune_env_kwargs"]["max_episode_steps"] == 50

@@ -1,5 +1,8 @@
 """Demonstrations: read from a dataset, sampled in every batch; an error where they do not fit."""
 
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +16,7 @@ from training.datasets.demonstrations import read_demonstrations  # noqa: E402
 from training.datasets.minari_store import random_policy, write_dataset  # noqa: E402
 from training.policies.policy import scripted_policy  # noqa: E402
 from training.policies.trained_policy import trained_policy  # noqa: E402
+from training.runs.run_folder import RunFolder  # noqa: E402
 from training.sb3.build import worlds_and_model  # noqa: E402
 from training.sb3.train import resume, train  # noqa: E402
 from training.settings.algorithms import SACConfig  # noqa: E402
@@ -106,8 +110,13 @@ def test_demonstrations_change_what_is_learned_and_a_run_resumes_with_them(confi
             return True
 
     half = train(config, folder, quiet=True, callbacks=[Interrupt()]).folder
+    assert half.model.stat().st_size < 200_000  # without the demonstrations
+    replaced = RunFolder(shutil.copytree(half.path, folder / "copy"))
     assert resume(half, quiet=True).steps >= 400
     assert half.config().demonstrations == NAME
+    write(seed=7, replace_existing=True)
+    with pytest.raises(UsageError, match=r"demonstrations of .* have been replaced by other ones"):
+        resume(replaced, quiet=True)
 
 
 @pytest.mark.parametrize(
@@ -134,6 +143,33 @@ def test_settings_that_contradict_demonstrations_raise(config):
         config.replace(env_wrapper="rigid_envs.wrappers.TimePenalty")
     with pytest.raises(UsageError, match="demonstration_fraction is 1"):
         config.replace(demonstration_fraction=1.0)
+    for fraction, size, shown in ((0.01, 32, 0), (0.9, 2, 2)):
+        with pytest.raises(
+            UsageError, match=rf"fraction is {fraction}, which is {shown} of {size}"
+        ):
+            config.replace(demonstration_fraction=fraction, batch_size=size)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"actions": np.zeros((3, 2), np.float32)}, r"actions of shape \(2,\); .* have \(3,\)"),
+        ({"infos": {}}, r"its episodes have no infos\['is_success'\]"),
+    ],
+)
+def test_datasets_of_other_programs_are_checked(config, monkeypatch, changed, message):
+    write()
+    iterate = minari.MinariDataset.iterate_episodes
+
+    def others(dataset):
+        return [replace(episode, **changed) for episode in iterate(dataset)]
+
+    monkeypatch.setattr(minari.MinariDataset, "iterate_episodes", others)
+    with pytest.raises(UsageError, match=message):
+        read_demonstrations(config)
+    monkeypatch.setattr(minari.MinariDataset, "iterate_episodes", lambda _: [])
+    with pytest.raises(UsageError, match="no episodes: record some"):
+        read_demonstrations(config)
 
 
 def test_without_minari_the_extra_is_named(config, monkeypatch):

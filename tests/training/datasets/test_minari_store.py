@@ -1,5 +1,10 @@
 """Datasets: Minari reads them back, its environment steps, and episodes can be played again."""
 
+import contextlib
+import os
+import signal
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,6 +12,7 @@ import pytest
 minari = pytest.importorskip("minari", reason="needs the extra data")
 
 from training.commands import cli  # noqa: E402
+from training.datasets import minari_store  # noqa: E402
 from training.datasets.minari_store import default_id, random_policy, write_dataset  # noqa: E402
 from training.policies.policy import scripted_policy  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
@@ -159,14 +165,46 @@ def test_an_error_leaves_what_was_there(folder):
     assert [path.name for path in folder.iterdir()] == ["kept-v0"]
 
 
+def test_a_dataset_that_another_process_wrote_meanwhile_is_kept(folder):
+    policy = random_policy(PUSH, **FAST)
+
+    def act(observation):
+        if not (folder / "same-v0").exists():
+            write_dataset(policy, 3, "same-v0")
+        return policy.act(observation)
+
+    with pytest.raises(UsageError, match="'same-v0' exists"):
+        write_dataset(replace(policy, act=act), 2, "same-v0")
+    assert minari.load_dataset("same-v0").total_episodes == 3
+    assert [path.name for path in folder.iterdir()] == ["same-v0"]
+
+
+def test_a_dataset_to_be_replaced_stays_until_the_new_one_is_complete(folder, monkeypatch):
+    policy = random_policy(PUSH, **FAST)
+    write_dataset(policy, 3, "mine/same-v0")
+
+    def killed(*_, **__):
+        assert minari.load_dataset("mine/same-v0").total_episodes == 3
+        assert list(minari.list_local_datasets()) == ["mine/same-v0"]
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(minari_store, "_write", killed)
+    monkeypatch.setattr(minari_store, "_datasets_in", contextlib.nullcontext)
+    with pytest.raises(KeyboardInterrupt):
+        write_dataset(policy, 2, "mine/same-v0", replace_existing=True)
+    assert minari.load_dataset("mine/same-v0").total_episodes == 3
+    assert [path.name for path in folder.iterdir()] == ["mine"]
+
+
 @pytest.mark.parametrize(
-    ("name", "env_id", "policy", "expected"),
+    ("env_id", "policy", "expected"),
     [
-        ("PushDense", "RigidEnvs/PushDense-v0", "ppo (runs/a b)", "rigid-envs/push-dense/ppo-v0"),
-        ("Stack", "RigidEnvs/Stack-v0", "scripted", "rigid-envs/stack/scripted-v0"),
+        ("RigidEnvs/PushDense-v0", "ppo (runs/a b)", "rigid-envs/push-dense/ppo-v0"),
+        ("RigidEnvs/Stack-v0", "scripted", "rigid-envs/stack/scripted-v0"),
+        ("RigidEnvs/PushT-v0", "trained-PushT-v0", "rigid-envs/push-t/trained-v0"),
     ],
 )
-def test_names(name, env_id, policy, expected):
+def test_names(env_id, policy, expected):
     assert default_id(env_id, policy) == expected
 
 
@@ -175,6 +213,9 @@ def test_names(name, env_id, policy, expected):
     [
         (["--dataset-id", "no version"], "name of the dataset is 'no version', should be like"),
         (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
+        (["--dataset-id", "x/push-v0"], "parts of at least two letters, digits, - or _"),
+        (["--dataset-id", "ä/push-v0"], "should be like rigid-envs/push/scripted-v0"),
+        (["--env-kwargs", "slowdown:0.5"], "'slowdown' is not allowed here: it is no argument"),
         (["--episodes", "0"], "should be an integer of at least 1"),
         (["--action-noise", "-0.1"], "action_noise is -0.1, should be a number of at least 0"),
         (["--slowdown", "1.5"], "slowdown is 1.5, should be a number from 0 to 1"),

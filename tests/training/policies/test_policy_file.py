@@ -188,7 +188,7 @@ def test_packaged_networks_take_less_than_300_kilobytes(tmp_path):
                 short |= {"n_steps": 16, "batch_size": 16}
             else:
                 short |= {"learning_starts": 8, "replay_buffer_class": None, "cloning_steps": 0}
-                short |= {"replay_buffer_kwargs": {}, "gradient_steps": 0, "buffer_size": 100}
+                short |= {"replay_buffer_kwargs": {}, "gradient_steps": 1, "buffer_size": 100}
             config = load_config(algo, env_id).replace(**short)
             folder = train(config, tmp_path, quiet=True).folder
             assert folder.policy.stat().st_size < 300_000

@@ -8,7 +8,7 @@ import pytest
 
 from tests.training.results.recorded import PLACE, change, update
 from training.policies.policy_file import load_policy_file, read_policy
-from training.results.evaluate import FIRST_SEED, evaluate
+from training.results.evaluate import evaluate
 from training.results.record_run import ROWS, _command
 from training.results.result import read_result, read_results
 from training.results.results_page import check_pages
@@ -16,6 +16,7 @@ from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import EVALUATION
 
 
 def test_result_contains_what_is_needed_to_judge_and_repeat_the_run(repository, runs, reach):
@@ -33,7 +34,7 @@ def test_result_contains_what_is_needed_to_judge_and_repeat_the_run(repository, 
     state = read_state(RunFolder(runs / "ppo" / "Test-Reach-v0_1").checkpoint)
     assert (result.algorithm, result.env_id, result.seed) == ("ppo", reach, 3)
     assert result.arguments == {"reward_type": "dense"}
-    assert (result.steps, result.episodes, result.first_seed) == (160, 20, FIRST_SEED)
+    assert (result.steps, result.episodes, result.first_seed) == (160, 20, EVALUATION)
     assert result.seconds == pytest.approx(state["seconds"], abs=1e-3)
     fraction = state["seconds_in_envs"] / state["seconds"]
     assert result.environment_time_fraction == pytest.approx(fraction, abs=1e-4)

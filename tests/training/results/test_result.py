@@ -6,17 +6,18 @@ import pytest
 
 from tests.training.results.recorded import PLACE, change, update
 from training.policies.policy_file import read_policy
-from training.results.evaluate import FIRST_SEED, evaluate
+from training.results.evaluate import evaluate
 from training.results.result import read_results, task_name
 from training.results.results import SOURCE
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import EVALUATION
 
 
 def test_shipped_policies_are_small_and_as_good_as_recorded():
     for result in read_results(SOURCE):
         file = result.folder(SOURCE) / "policy.safetensors"
         assert file.stat().st_size <= 300_000
-        outcome = evaluate(read_policy(file), 100, seed=FIRST_SEED, quiet=True)
+        outcome = evaluate(read_policy(file), 100, seed=EVALUATION, quiet=True)
         assert outcome.success_at_end.mean() >= result.success_at_end["low"] - 0.1
 
 

@@ -8,10 +8,11 @@ import pytest
 from training.policies.episodes import play_episodes
 from training.policies.trained_policy import trained_policy
 from training.results.plot import EVALUATED, draw_learning_curves, read_learning_curve
-from training.sb3.evaluation import FIRST_SEED
+from training.sb3 import evaluation
 from training.sb3.train import resume, train
 from training.settings.environments import make_vector_env
 from training.settings.errors import UsageError
+from training.settings.seed_ranges import TRAINING_EVALUATION
 
 
 def test_an_evaluation_plays_new_episodes_with_the_mean_action(quick_ppo, tmp_path):
@@ -25,7 +26,7 @@ def test_an_evaluation_plays_new_episodes_with_the_mean_action(quick_ppo, tmp_pa
         rates = [row["eval/success_rate"] for row in csv.DictReader(file)]
     assert [n for n, rate in enumerate(rates) if rate] == [99, 199]
     envs = make_vector_env(config.env_id, 100, **config.env_kwargs)
-    played = play_episodes(envs, trained_policy(folder.path).act, FIRST_SEED + 2 * 100)
+    played = play_episodes(envs, trained_policy(folder.path).act, TRAINING_EVALUATION + 2 * 100)
     assert float(rates[-1]) == played.success_at_end.mean() > 0.0
     curve = read_learning_curve(folder)
     assert [row[EVALUATED] for row in curve if EVALUATED in row] == [
@@ -73,14 +74,12 @@ def test_a_run_that_reaches_its_target_keeps_the_policy_that_was_evaluated(quick
     evaluations = (result.steps - config.n_envs) // config.eval_freq  # training ends a step later
     envs = make_vector_env(config.env_id, 100, **config.env_kwargs)
     policy = trained_policy(result.folder.path)
-    played = play_episodes(envs, policy.act, FIRST_SEED + evaluations * 100)
+    played = play_episodes(envs, policy.act, TRAINING_EVALUATION + evaluations * 100)
     rates = [row[EVALUATED] for row in read_learning_curve(result.folder) if EVALUATED in row]
     assert played.success_at_end.mean() == rates[-1] > 0.0
 
 
 def test_a_resumed_run_evaluates_other_episodes_than_before(quick_ppo, tmp_path, monkeypatch):
-    from training.sb3 import evaluation
-
     seeds = []
 
     def play(envs, act, seed):
@@ -98,4 +97,22 @@ def test_a_resumed_run_evaluates_other_episodes_than_before(quick_ppo, tmp_path,
 
     folder = train(config, tmp_path, quiet=True, callbacks=[Interrupt()]).folder
     resume(folder, quiet=True)
-    assert seeds == [FIRST_SEED + 10 * k for k in (1, 2, 3, 4)]
+    assert seeds == [TRAINING_EVALUATION + 10 * k for k in (1, 2, 3, 4)]
+
+
+def test_a_rollout_before_an_interrupted_evaluation_is_repeated(quick_ppo, tmp_path, monkeypatch):
+    config = quick_ppo.replace(n_timesteps=320, eval_freq=80, n_eval_episodes=10)
+
+    def interrupted(envs, act, seed):
+        if seed > TRAINING_EVALUATION + 10:
+            raise KeyboardInterrupt
+        return play_episodes(envs, act, seed)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(evaluation, "play_episodes", interrupted)
+        ended = train(config, tmp_path, quiet=True)
+    assert ended.steps == 80  # no update has used the second rollout
+    assert resume(ended.folder, quiet=True).steps == 320
+    with ended.folder.progress.open(newline="") as file:
+        evaluated = [row for row in csv.DictReader(file) if row.get("eval/success_rate")]
+    assert [int(row["time/total_timesteps"]) for row in evaluated] == [80, 160, 240, 320]

@@ -1,12 +1,16 @@
 """The fine-tuning stage: other arguments of the environment in the last part of a run."""
 
+import shutil
+
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training.policies.episodes import Episodes
 from training.policies.policy_file import read_policy
 from training.policies.trained_policy import trained_policy
+from training.runs.run_folder import RunFolder
 from training.sb3 import build, evaluation
 from training.sb3 import train as train_module
 from training.sb3.train import resume, train
@@ -92,9 +96,14 @@ def test_run_interrupted_in_fine_tuning_resumes_in_it(quick_ppo, tmp_path, made)
     config = quick_ppo.replace(n_timesteps=320, finetune_timesteps=160, finetune_env_kwargs=FINER)
     ended = train(config, tmp_path, quiet=True, save_every=80, callbacks=[InterruptAfter(250)])
     assert ended.steps == 240
+    copied = RunFolder(shutil.copytree(ended.folder.path, tmp_path / "copy"))
     made.clear()
     assert resume(ended.folder, quiet=True).steps == 320
     assert made == ["accurate"] * 10
+    # with the same episodes each time
+    resume(copied, quiet=True)
+    for name, values in load_file(ended.folder.policy).items():
+        np.testing.assert_array_equal(load_file(copied.policy)[name], values)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import CSVOutputFormat
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -338,3 +339,21 @@ def test_command_resumes_and_rejects_contradictory_flags(quick_ppo, tmp_path, mo
     speed = float(line.partition("(")[2].partition(" steps/s")[0].replace(",", ""))
     assert speed == pytest.approx(400 / seconds, rel=0.3)  # of the whole run
     assert [path.name for path in (tmp_path / "ppo").iterdir()] == ["Test-Reach-v0_1"]
+
+
+def test_a_run_whose_last_update_was_interrupted_can_be_finished(quick_ppo, tmp_path, monkeypatch):
+    update = PPO.train
+
+    def interrupted(model):
+        if model.num_timesteps >= 160:
+            raise KeyboardInterrupt
+        update(model)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(PPO, "train", interrupted)
+        ended = train(quick_ppo, tmp_path, quiet=True)
+    assert (ended.steps, ended.interrupted) == (160, True)
+    finished = resume(ended.folder, quiet=True)
+    assert (finished.steps, finished.interrupted) == (160, False)
+    with pytest.raises(UsageError, match="is finished after 160 steps"):
+        resume(ended.folder)

@@ -155,7 +155,8 @@ def test_unknown_key_names_itself_the_file_and_the_nearest_key(write_yaml):
         ("env_kwargs: [dense]", "a mapping"),
         ("env_kwargs: {1: dense}", "keys are text"),
         ("target_success_rate: 95", "a number above 0 and at most 1, or null"),
-        ("seed: -1", "an integer of at least 0, or null"),
+        ("seed: -1", "an integer of at least 0 and at most 4294967295, or null"),
+        ("seed: 4294967296", "an integer of at least 0 and at most 4294967295, or null"),
         ("batch_size: 1", "an integer of at least 2"),
     ],
 )
@@ -174,7 +175,7 @@ def test_entropy_coefficient_of_sac_may_be_learned(value, write_yaml):
     assert load(write_yaml, f"{{n_timesteps: 100, ent_coef: {value}}}", "sac")
 
 
-@pytest.mark.parametrize("value", ["automatic", "auto_", "auto_x", "-0.1"])
+@pytest.mark.parametrize("value", ["automatic", "auto_", "auto_x", "auto_0", "auto_-1", "-0.1"])
 def test_other_entropy_coefficients_raise(value, write_yaml):
     with pytest.raises(UsageError, match=r'ent_coef is .*should be .*"auto"'):
         load(write_yaml, f"{{n_timesteps: 100, ent_coef: {value}}}", "sac")
@@ -192,6 +193,19 @@ def test_unknown_top_level_section_raises(write_yaml):
 
 def test_nearest_name_ignores_case():
     assert nearest("PPO", ["sac", "ppo"]) == "ppo"
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("gradient_steps: 0", "gradient_steps is 0, should be an integer of at least 1, or -1"),
+        ("policy_kwargs: {log_std_init: -1}", "log_std_init requires algorithm ppo"),
+    ],
+)
+def test_settings_of_sac_that_have_no_effect_raise(write_yaml, setting, message):
+    with pytest.raises(UsageError, match=message):
+        load(write_yaml, f"{{n_timesteps: 100, {setting}}}", "sac")
+    assert load(write_yaml, "{n_timesteps: 100, gradient_steps: -1}", "sac").gradient_steps == -1
 
 
 def test_missing_n_timesteps_raises(write_yaml):

@@ -1,0 +1,12 @@
+"""Seeds of episodes: ranges that are far from each other, and from training, which starts at 0."""
+
+LIMIT = 2**32
+"""Upper bound of a run's seed, which is NumPy's."""
+EVALUATION = 1_000_000
+"""First seed of recorded results and `evaluate`."""
+DATASET = 2_000_000
+"""First seed of datasets."""
+SEARCH = 5_000_000
+"""First seed of the evaluation of a search's trials."""
+TRAINING_EVALUATION = 10_000_000
+"""First seed of evaluations during training."""
