@@ -206,6 +206,7 @@ def add_dataset(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-n",
         "--episodes",
+        "--n-episodes",
         dest="n_episodes",
         type=count,
         default=1000,

@@ -13,11 +13,11 @@ def add_training(parser: argparse.ArgumentParser) -> None:
     """Flags for the settings of training, and for the machine."""
     parser.add_argument(
         "--algo",
-        help=f"algorithm: ppo or sac (default: {DEFAULT_ALGO}; with --resume, that of the run)",
+        help=f"algorithm: ppo or sac (default: {DEFAULT_ALGO})",
     )
     parser.add_argument(
         "--env",
-        help=f"environment id (default: {DEFAULT_ENV}; with --resume, that of the run)",
+        help=f"environment id (default: {DEFAULT_ENV})",
     )
     parser.add_argument(
         "--config", type=Path, help="YAML file of settings (default: configs/<algo>.yaml)"

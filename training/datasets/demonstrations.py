@@ -38,6 +38,11 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
         dataset = minari.load_dataset(name)
         episodes = [_recorded(episode) for episode in dataset.iterate_episodes()]
         spec = dataset.spec.env_spec
+    except FileNotFoundError:
+        raise UsageError(
+            f"demonstrations is {name!r}, but there is no such dataset; it should be one in "
+            "Minari's folder, as `rigid-envs dataset` writes it and `minari list local` shows it"
+        ) from None
     except Exception as error:  # Minari and h5py raise exceptions of many types
         reason = " ".join(str(error).split())
         raise UsageError(

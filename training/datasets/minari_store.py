@@ -74,8 +74,9 @@ class Written:
         return (
             f"{self.dataset_id}: {self.episodes:,} episodes, {self.steps:,} steps, "
             f"{self.success:.1%} solved, in {self.seconds:.1f} s\n"
-            f"mean return {self.mean_return:.2f} (random actions {self.low_score:.2f}, "
-            f"expert {high})\n"
+            f"mean return {self.mean_return:.2f}; "
+            f"reference scores, of {REFERENCE_EPISODES} episodes: "
+            f"random actions {self.low_score:.2f}, expert {high}\n"
             f"in {self.path}\n"
             f'to read it: minari.load_dataset("{self.dataset_id}")'
         )

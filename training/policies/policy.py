@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from training.scripted import Controller, controller_for
+from training.settings.errors import UsageError
 
 SCRIPTED = "scripted"
 
@@ -36,9 +37,25 @@ def scripted_policy(env_id: str, **env_kwargs: Any) -> Policy:
             passed to it as well, as `obstacles` of Push, which is not observed.
 
     Raises:
-        UsageError: The id is unknown, or its task has no controller.
+        UsageError: The id is unknown, its task has no controller, or the state is not observed.
     """
     controller = controller_for(env_id)
+    if env_kwargs.get("obs_type") == "pixels":
+        raise UsageError(
+            "obs_type is 'pixels', should be 'state' or 'pixels+state': a scripted controller acts "
+            "from the state"
+        )
     parameters = signature(controller).parameters
     passed = {name: value for name, value in env_kwargs.items() if name in parameters}
-    return Policy(partial(controller, **passed), env_id, SCRIPTED, env_kwargs)
+    return Policy(of_state(partial(controller, **passed)), env_id, SCRIPTED, env_kwargs)
+
+
+def of_state(act: Controller) -> Controller:
+    """A policy of the state that also acts where the state is observed beside pixels."""
+
+    def acting(observation: dict[str, Any]) -> Any:
+        if "state" in observation:
+            observation = {**observation, "observation": observation["state"]}
+        return act(observation)
+
+    return acting

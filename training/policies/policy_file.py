@@ -27,7 +27,7 @@ from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.policies.keypoints import keypoints
-from training.policies.policy import Policy
+from training.policies.policy import Policy, of_state
 from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, nearest
@@ -228,7 +228,8 @@ def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None
     elif env_id != environment.id:
         env_kwargs = {**env_kwargs, **registered_arguments(env_id)}
     name = f"{content.header.algorithm} ({path})"
-    return Policy(content.act, env_id or environment.id, name, env_kwargs, path.parent)
+    act = content.act if content.header.network.keypoints is not None else of_state(content.act)
+    return Policy(act, env_id or environment.id, name, env_kwargs, path.parent)
 
 
 def _check_installed(path: Path, env_id: str) -> None:

@@ -19,6 +19,7 @@ from rich.table import Table
 from training.policies.episodes import play_episodes
 from training.policies.policy import Policy
 from training.settings.environments import (
+    check_episodes_end,
     effective_fidelity,
     make_vector_env,
     registered_arguments,
@@ -79,6 +80,7 @@ def evaluate(
         raise UsageError(f"seed is {seed}, should be at least 0")
     worlds = min(episodes, WORLDS)
     arguments = {**policy.env_kwargs, **env_kwargs}
+    check_episodes_end(arguments)
     envs = make_vector_env(policy.env_id, worlds, **arguments)
     start = time.perf_counter()
     rounds = []

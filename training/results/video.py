@@ -14,7 +14,7 @@ from rich.progress import track
 from rigid_envs.tasks import Task
 from training.policies.policy import Policy
 from training.results.gif import WIDTH, GifWriter
-from training.settings.environments import make_single_env
+from training.settings.environments import check_episodes_end, make_single_env
 from training.settings.errors import UsageError
 from training.settings.seed_ranges import EVALUATION
 
@@ -56,7 +56,9 @@ def record(
     """
     if episodes < 1:
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
-    env = make_video_env(policy.env_id, {**policy.env_kwargs, **env_kwargs})
+    arguments = {**policy.env_kwargs, **env_kwargs}
+    check_episodes_end(arguments)
+    env = make_video_env(policy.env_id, arguments)
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())

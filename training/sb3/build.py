@@ -96,6 +96,7 @@ def _wrapped(worlds: RigidVecEnv, config: TrainConfig) -> VecEnv:
             norm_obs=config.norm_obs,
             norm_reward=config.norm_reward,
             gamma=config.gamma,
+            epsilon=config.norm_epsilon,
         )
     # SAC: rewards are not scaled, because old transitions would get the statistics of the time at
     # which they are sampled. Goals are not scaled, because achieved and desired goals with

@@ -92,6 +92,15 @@ def _check_her(config: TrainConfig, envs: Any) -> None:
     """Raises UsageError if HER is configured and cannot recompute the reward from goals."""
     if not isinstance(config, SACConfig) or config.replay_buffer_class is None:
         return
+    steps = envs.spec.max_episode_steps if envs.spec is not None else None
+    limit = config.env_kwargs.get("max_episode_steps", steps)
+    complete = None if limit is None else config.n_envs * limit
+    early = bool(config.env_kwargs.get("terminate_on_success"))
+    if complete is not None and config.learning_starts < complete and not early:
+        raise UsageError(
+            f"{config.env_id}: learning_starts is {config.learning_starts}, should be at least "
+            f"n_envs × max_episode_steps = {complete}: HER samples from complete episodes"
+        )
     goal = np.zeros((1, *envs.single_observation_space["desired_goal"].shape))
     try:
         envs.compute_reward(goal, goal + 1.0, [{}])

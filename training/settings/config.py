@@ -63,8 +63,8 @@ MIRROR_RULES = {"mirrors": mirror_list}
 PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
 """Further ones, of policies that act from pixels."""
 POLICY_RULES = NETWORK_RULES | BOUNDED_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
-NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean}
-"""Arguments of VecNormalize that say what is scaled, both true by default."""
+NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean, "epsilon": number(above=0)}
+"""Arguments of VecNormalize: what is scaled, by default both, and what is added to variances."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,9 +99,11 @@ class TrainConfig:
     finetune_env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments that replace those of `env_kwargs` in the fine-tuning stage, such as a higher
     fidelity. The policy is evaluated with them."""
-    normalize: bool | dict[str, bool] = setting(true_false_or(NORMALIZE_RULES), False)
+    normalize: bool | dict[str, Any] = setting(true_false_or(NORMALIZE_RULES), False)
     """Scale observations and rewards by their running mean and deviation (VecNormalize);
-    {norm_obs: false} scales only rewards, {norm_reward: false} only observations."""
+    {norm_obs: false} scales only rewards, {norm_reward: false} only observations, and
+    {epsilon: 1.0e-4} adds 1e-4 to all variances, so that a component that hardly changes stays
+    small."""
     eval_env_kwargs: dict[str, Any] = setting(mapping(), {})
     """Arguments that replace those of training when the policy is evaluated, such as the length of
     episodes."""
@@ -201,9 +203,15 @@ class TrainConfig:
         """Whether rewards are scaled."""
         return self._scales("norm_reward")
 
+    @property
+    def norm_epsilon(self) -> float:
+        """What is added to the variances; by default as in VecNormalize."""
+        chosen = self.normalize
+        return 1e-8 if isinstance(chosen, bool) else float(chosen.get("epsilon", 1e-8))
+
     def _scales(self, name: str) -> bool:
         chosen = self.normalize
-        return chosen if isinstance(chosen, bool) else chosen.get(name, True)
+        return chosen if isinstance(chosen, bool) else bool(chosen.get(name, True))
 
     @property
     def last_stage_kwargs(self) -> dict[str, Any]:
@@ -241,6 +249,11 @@ class TrainConfig:
                 f"{where}: target_success_rate is {self.target_success_rate}, but eval_freq is 0: "
                 "only an evaluation can reach it"
             )
+        if self.final_env_kwargs.get("max_episode_steps") == -1:
+            raise UsageError(
+                f"{where}: max_episode_steps is -1, should be at least 1, or given in "
+                "eval_env_kwargs: policies are evaluated on whole episodes"
+            )
         symlog = self.policy in self.symlog_policies
         for rules, policies in (
             (SYMLOG_RULES, self.symlog_policies),
@@ -252,6 +265,13 @@ class TrainConfig:
                 if name in self.policy_kwargs and self.policy not in policies:
                     required = f"policy: {' or '.join(policies)}" if policies else "algorithm ppo"
                     raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
+        observed = str(self.final_env_kwargs.get("obs_type", "state"))
+        if observed.startswith("pixels") != (self.policy in self.pixel_policies):
+            raise UsageError(
+                f"{where}: policy is {self.policy} with obs_type {observed}: "
+                "training.policies.pixels.PixelPolicy acts from pixels, as in configs/pixels.yaml, "
+                "the other policies from the state"
+            )
         first = self.policy_kwargs.get("log_std_init")
         if isinstance(first, list) and self.policy not in self.bounded_policies:
             raise UsageError(

@@ -88,7 +88,9 @@ def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:
     for word in words:
         key, colon, value = word.partition(":")
         if not key or not colon:
-            raise UsageError(f"{source}: {word!r} should be KEY:VALUE")
+            raise UsageError(
+                f"{source}: {word!r} should be KEY:VALUE; a run or policy goes before {source}"
+            )
         try:
             settings[key] = yaml.safe_load(value)
         except yaml.YAMLError:

@@ -80,6 +80,14 @@ def make_single_env(env_id: str, /, **env_kwargs: Any) -> gym.Env:
     return _make(env_id, env_kwargs, lambda: gym.make(env_id, **env_kwargs))
 
 
+def check_episodes_end(env_kwargs: dict[str, Any]) -> None:
+    """Raises UsageError for episodes without an end, where whole ones are played."""
+    if env_kwargs.get("max_episode_steps") == -1:
+        raise UsageError(
+            "max_episode_steps is -1, should be at least 1 here: whole episodes are played"
+        )
+
+
 def effective_fidelity(env_id: str, env_kwargs: dict[str, Any]) -> Any:
     """The fidelity that an environment uses: the argument, or the default of its constructor.
 

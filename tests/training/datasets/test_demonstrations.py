@@ -15,7 +15,7 @@ from training.datasets import demonstrations  # noqa: E402
 from training.datasets.demonstrations import read_demonstrations  # noqa: E402
 from training.datasets.minari_store import random_policy, write_dataset  # noqa: E402
 from training.policies.policy import scripted_policy  # noqa: E402
-from training.policies.trained_policy import trained_policy  # noqa: E402
+from training.policies.policy_file import load_policy_file  # noqa: E402
 from training.runs.run_folder import RunFolder  # noqa: E402
 from training.sb3.build import worlds_and_model  # noqa: E402
 from training.sb3.train import resume, train  # noqa: E402
@@ -100,7 +100,7 @@ def test_demonstrations_change_what_is_learned_and_a_run_resumes_with_them(confi
     write()
     plain = train(config.replace(demonstrations=None), folder, quiet=True).folder
     shown = train(config, folder, quiet=True).folder
-    first, other = (trained_policy(f.path).act.__self__.layers for f in (plain, shown))
+    first, other = (load_policy_file(f.policy).layers for f in (plain, shown))
     assert any((a[0] != b[0]).any() for a, b in zip(first, other, strict=True))
 
     class Interrupt(BaseCallback):
@@ -122,7 +122,7 @@ def test_demonstrations_change_what_is_learned_and_a_run_resumes_with_them(confi
 @pytest.mark.parametrize(
     ("written", "settings", "message"),
     [
-        (None, {}, r"demonstrations is 'reach/scripted-v0': .*should be a dataset in Minari's"),
+        (None, {}, "demonstrations is 'reach/scripted-v0', but there is no such dataset; it"),
         ({"policy": random_policy("RigidEnvs/Push-v0", **FAST)}, {},
          r"a dataset of RigidEnvs/Push-v0; it should be of RigidEnvs/Reach-v0"),
         ({"reward_type": "dense"}, {}, r"the dense reward; training has the sparse one: record"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from training.policies.episodes import play_episodes
+from training.policies.policy_file import load_policy_file
 from training.policies.trained_policy import trained_policy
 from training.results.plot import EVALUATED, draw_learning_curves, read_learning_curve
 from training.sb3 import evaluation
@@ -41,7 +42,7 @@ def test_evaluations_change_no_bit_of_the_training(quick, request, tmp_path):
     config = request.getfixturevalue(quick)
     plain = train(config, tmp_path, quiet=True).folder
     often = train(config.replace(eval_freq=16, n_eval_episodes=20), tmp_path, quiet=True).folder
-    for one, other in zip(*(trained_policy(f.path).act.__self__.layers for f in (plain, often)),
+    for one, other in zip(*(load_policy_file(f.policy).layers for f in (plain, often)),
                           strict=True):  # fmt: skip
         np.testing.assert_array_equal(one[0], other[0])
 
