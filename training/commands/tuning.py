@@ -15,14 +15,14 @@ from typing import Any
 import optuna
 from optuna.trial import TrialState
 
-from training.results.result import task_name
 from training.results.trial import Stopped, success_of
-from training.runs.run_folder import folder_name
 from training.sb3.checks import check_settings
 from training.settings.config import TrainConfig
+from training.settings.environment_ids import folder_name
 from training.settings.errors import UsageError
 from training.settings.search_space import draw, with_drawn
 from training.settings.seed_ranges import LIMIT
+from training.settings.tasks import task_name
 
 STEPS_DIVISOR = 10
 """By default a trial has this fraction, a tenth, of the steps in the settings."""

@@ -11,8 +11,16 @@ from training.settings.algorithms import SACConfig
 from training.settings.environment_ids import plain_id
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError
+from training.settings.tasks import changed_arguments
 
 Array = np.ndarray
+
+FREE = {
+    "randomize", "max_episode_steps", "terminate_on_success", "partial_tower_start_prob",
+    "near_grasp_start_prob", "task", "obs_type", "pixels", "frame_stack", "observe_parameters",
+}  # fmt: skip
+"""Arguments in which demonstrations may differ: starts, ends, parameters, and what is compared by
+the shapes of the observation."""
 
 
 def read_demonstrations(config: SACConfig) -> list[Recorded]:
@@ -70,6 +78,11 @@ def _recorded(episode: Any) -> Recorded:
     )
 
 
+def _task_of(spec: Any) -> set[str]:
+    """Arguments of an environment that make another task, in which other actions are right."""
+    return set(changed_arguments(spec.id, spec.kwargs)) - FREE
+
+
 def _check(config: SACConfig, spec: Any, episodes: list[Recorded]) -> None:
     """Raises UsageError if the demonstrations do not fit the settings."""
     start = f"demonstrations is {config.demonstrations!r}, a dataset of"
@@ -86,6 +99,13 @@ def _check(config: SACConfig, spec: Any, episodes: list[Recorded]) -> None:
             f"{start} the {given} reward; training has the {reward_type} one: record it with "
             f"--env-kwargs reward_type:{reward_type}"
         )
+    for name in sorted({*_task_of(own), *_task_of(spec)}):
+        recorded, wanted = (one.kwargs.get(name) for one in (spec, own))
+        if recorded != wanted:
+            raise UsageError(
+                f"{start} {env_id} with {name} {recorded!r}; training has {wanted!r}: record it "
+                "with the same --env-kwargs"
+            )
     if not episodes:
         raise UsageError(f"{start} no episodes: record some with `rigid-envs dataset`")
     if (size := episodes[0].actions.shape[1:]) != action:

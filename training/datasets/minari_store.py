@@ -6,6 +6,7 @@ and actions are stored bit for bit, so playing an episode's actions after `reset
 the same observations again.
 """
 
+import json
 import os
 import re
 import tempfile
@@ -28,9 +29,16 @@ from training.datasets.record import Recorded, record_episodes
 from training.policies.episodes import play_episodes
 from training.policies.policy import Policy, scripted_policy
 from training.policies.trained_policy import SHIPPED
-from training.settings.environments import make_single_env, make_vector_env
+from training.settings.environment_ids import dense_id, plain_id
+from training.settings.environments import (
+    check_episodes_end,
+    make_single_env,
+    make_vector_env,
+    registered_arguments,
+)
 from training.settings.errors import UsageError
 from training.settings.seed_ranges import DATASET
+from training.settings.tasks import changed_arguments
 
 Array = np.ndarray
 
@@ -95,13 +103,26 @@ def random_policy(env_id: str, seed: int = 0, **env_kwargs: Any) -> Policy:
     return Policy(act, env_id, RANDOM, env_kwargs)
 
 
-def default_id(env_id: str, policy: str, action_noise: float = 0.0, slowdown: float = 0.0) -> str:
-    """The name of a dataset, as rigid-envs/push-dense/scripted-v0 or .../scripted-noise-0-06-v0."""
-    name = env_id.rpartition("/")[2].rpartition("-v")[0]
+def default_id(
+    env_id: str, policy: str, arguments: dict[str, Any], disturbance: tuple[float, float]
+) -> str:
+    """The name of a dataset, as rigid-envs/push-dense/scripted-v0 or .../scripted-noise-0-06-v0.
+
+    Args:
+        env_id: Environment id.
+        policy: Name of the policy.
+        arguments: Those of the environment; the name has those that make another task.
+        disturbance: Noise and slowdown of the actions.
+    """
+    dense = {**registered_arguments(env_id), **arguments}.get("reward_type") == "dense"
+    name = (dense_id if dense else plain_id)(env_id).rpartition("/")[2].rpartition("-v")[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
     algorithm = SHIPPED if policy.startswith(f"{SHIPPED}-") else policy.partition(" ")[0]
     algorithm = re.sub(r"[^-\w]+", "-", algorithm).strip("-").lower()
-    for word, value in (("noise", action_noise), ("slowdown", slowdown)):
+    for key in changed_arguments(env_id, arguments):
+        shown = re.sub(r"[^A-Za-z0-9]+", "-", json.dumps(arguments[key], default=str)).strip("-")
+        algorithm += f"-{key}-{shown}"
+    for word, value in zip(("noise", "slowdown"), disturbance, strict=True):
         algorithm += re.sub(r"[^\w]+", "-", f"-{word}-{float(value)!r}") if value else ""
     return f"rigid-envs/{words}/{algorithm}-v0"
 
@@ -146,16 +167,16 @@ def write_dataset(
         raise UsageError(f"action_noise is {action_noise}, should be a number of at least 0")
     if not 0.0 <= slowdown <= 1.0:
         raise UsageError(f"slowdown is {slowdown}, should be a number from 0 to 1")
-    name = dataset_id
-    if name is None:
-        name = default_id(policy.env_id, policy.name, action_noise, slowdown)
+    arguments, disturbance = {**policy.env_kwargs, **env_kwargs}, (action_noise, slowdown)
+    check_episodes_end(arguments)
+    make_single_env(policy.env_id, **arguments).close()  # reports invalid arguments
+    name = dataset_id or default_id(policy.env_id, policy.name, arguments, disturbance)
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"name of the dataset is {name!r}, should be like rigid-envs/push/scripted-v0: parts "
             "of at least two letters, digits, - or _, and a version"
         )
     _check_free(name, replace_existing)
-    arguments, disturbance = {**policy.env_kwargs, **env_kwargs}, (action_noise, slowdown)
     recorded = _play(policy, episodes, seed, disturbance, arguments)
     low, high = _scores(policy, arguments)
     path = _placed(

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from training.runs.run_folder import RunFolder, folder_name
+from training.runs.run_folder import RunFolder
+from training.settings.environment_ids import folder_name
 from training.settings.errors import UsageError
 
 STEPS = "time/total_timesteps"

@@ -13,7 +13,7 @@ from training.policies.policy_header import Success
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate, wilson_interval
 from training.results.plot import read_learning_curve
-from training.results.result import RESULT, Result, parse_result, read_results, task_name
+from training.results.result import RESULT, Result, parse_result, read_results
 from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
 from training.settings.algorithms import SACConfig
@@ -21,6 +21,7 @@ from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
 from training.settings.seed_ranges import EVALUATION
+from training.settings.tasks import task_name
 
 MAX_FILE_BYTES = 300_000
 """Largest policy or image, because a git repository stores every version of it."""

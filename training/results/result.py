@@ -9,15 +9,10 @@ results/<algo>/<environment>_seed<seed>/
 
 import dataclasses
 import json
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-
-import rigid_envs  # noqa: F401  (registers the ids)
-from training.runs.run_folder import folder_name
 from training.settings.environment_ids import plain_id
 from training.settings.errors import UsageError, nearest
 from training.settings.settings import (
@@ -30,13 +25,9 @@ from training.settings.settings import (
     setting,
     text,
 )
+from training.settings.tasks import changed_arguments, task_name
 
 RESULT = "result.json"
-SAME_TASK = (
-    "reward_type", "fidelity", "observe_task_guide",
-    "pixel_size", "camera",
-)  # fmt: skip
-"""Arguments of the environment that do not change the task to be solved."""
 
 
 def _rate(value: Any) -> dict[str, float]:
@@ -119,32 +110,6 @@ class Result:
     def as_json(self) -> str:
         """The text of a file that `read_result` reads back to an equal result."""
         return json.dumps(dataclasses.asdict(self), indent=2) + "\n"
-
-
-def task_name(env_id: str, arguments: dict[str, Any]) -> str:
-    """Name of the task that an environment and its arguments define.
-
-    As RigidEnvs-Push-v0-target_yaw-true. A dense id and its plain id are the same task.
-
-    Args:
-        env_id: Environment id.
-        arguments: Its arguments. The name omits those of SAME_TASK, those that are false or 0, and
-            a `max_episode_steps` equal to the registered one.
-    """
-    words = [folder_name(plain_id(env_id))]
-    for name in changed_arguments(env_id, arguments):
-        value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
-        words.append(f"{name}-{value.strip('-')}")
-    return "-".join(words)
-
-
-def changed_arguments(env_id: str, arguments: dict[str, Any]) -> list[str]:
-    """Names of the arguments that make another task than the registered one, see `task_name`."""
-    spec = gym.registry.get(env_id)
-    changed = {name for name, value in arguments.items() if value}
-    if spec is not None and arguments.get("max_episode_steps") == spec.max_episode_steps:
-        changed.discard("max_episode_steps")
-    return sorted(changed - set(SAME_TASK))
 
 
 def read_result(file: Path) -> Result:

@@ -9,12 +9,13 @@ from typing import Any
 
 import gymnasium as gym
 
-from training.results.result import Result, changed_arguments, read_results
+from training.results.result import Result, read_results
 from training.settings.algorithms import SACConfig
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError
+from training.settings.tasks import changed_arguments
 
 PAGE = Path("docs/results.md")
 README = Path("README.md")

@@ -28,6 +28,7 @@ from filelock import FileLock, Timeout
 
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
+from training.settings.environment_ids import folder_name
 from training.settings.errors import UsageError, check_exists
 
 CHECKPOINT, LOCK = "checkpoint", ".lock"
@@ -219,11 +220,6 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         _sync(path.parent)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
-
-
-def folder_name(env_id: str) -> str:
-    """An environment id as part of a folder name, as in RigidEnvs-Push-v0."""
-    return env_id.replace("/", "-").replace(":", "-")
 
 
 def package_versions() -> dict[str, Any]:

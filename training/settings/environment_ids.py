@@ -20,3 +20,8 @@ def dense_id(env_id: str) -> str:
     Returned as it is: a dense id, and an id without a version.
     """
     return re.sub(r"(?<!Dense)(-v\d+)$", r"Dense\1", env_id)
+
+
+def folder_name(env_id: str) -> str:
+    """An environment id as part of a folder name, as in RigidEnvs-Push-v0."""
+    return env_id.replace("/", "-").replace(":", "-")

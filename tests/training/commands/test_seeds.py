@@ -117,6 +117,7 @@ def test_ray_names_its_extra_where_it_is_missing(words, monkeypatch, capsys, tmp
         assert cli.main([*words, *more]) == 2
         assert capsys.readouterr().err == (
             "error: this command requires no_such_package; "
-            'to install, in a clone: pip install -c constraints.txt ".[ray]"\n'
+            'to install, in a clone: pip install -c constraints-ray.txt -e ".[ray,tune]", '
+            "into a virtual environment of its own\n"
         )
     assert not (tmp_path / "runs").exists()

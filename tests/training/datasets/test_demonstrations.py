@@ -181,3 +181,18 @@ def test_without_minari_the_extra_is_named(config, monkeypatch):
 def test_the_command_needs_an_algorithm_that_learns_from_others(capsys):
     assert cli.main(["train", "--demonstrations", NAME]) == 2
     assert "--demonstrations is 'reach/scripted-v0', but ppo learns" in capsys.readouterr().err
+
+
+def test_demonstrations_of_another_task_raise(config):
+    push, name = "RigidEnvs/Push-v0", "push/scripted-v0"
+    write_dataset(scripted_policy(push, **FAST), 4, name)
+    arguments = {**config.as_mapping(), "demonstrations": name}
+    for kwargs, message in (
+        ({**FAST, "obstacles": 2}, r"Push-v0 with obstacles None; training has 2: record it with"),
+        ({**FAST, "block": "t"}, r"Push-v0 with block None; training has 't'"),
+    ):
+        other = SACConfig.from_mapping(push, {**arguments, "env_kwargs": kwargs}, "test")
+        with pytest.raises(UsageError, match=message):
+            read_demonstrations(other)
+    drawn = {**FAST, "randomize": {"mass": [0.5, 2.0]}, "max_episode_steps": 60}
+    assert read_demonstrations(SACConfig.from_mapping(push, {**arguments, "env_kwargs": drawn}, ""))

@@ -15,6 +15,7 @@ from training.commands import cli  # noqa: E402
 from training.datasets import minari_store  # noqa: E402
 from training.datasets.minari_store import default_id, random_policy, write_dataset  # noqa: E402
 from training.policies.policy import scripted_policy  # noqa: E402
+from training.policies.trained_policy import shipped_policy  # noqa: E402
 from training.settings.errors import UsageError  # noqa: E402
 
 PUSH, STACK, THROW = (f"RigidEnvs/{task}-v0" for task in ("Push", "Stack", "Throw"))
@@ -140,7 +141,6 @@ def test_a_dataset_is_replaced_only_if_asked(folder):
     policy = random_policy(PUSH, **FAST)
     write_dataset(policy, 2)
     name = "rigid-envs/push/random-v0"
-    assert default_id(PUSH, "random") == name
     with pytest.raises(UsageError, match=rf"{name}' exists.*--replace"):
         write_dataset(policy, 3)
     assert minari.load_dataset(name).total_episodes == 2
@@ -197,15 +197,18 @@ def test_a_dataset_to_be_replaced_stays_until_the_new_one_is_complete(folder, mo
 
 
 @pytest.mark.parametrize(
-    ("env_id", "policy", "expected"),
+    ("env_id", "policy", "arguments", "expected"),
     [
-        ("RigidEnvs/PushDense-v0", "ppo (runs/a b)", "rigid-envs/push-dense/ppo-v0"),
-        ("RigidEnvs/Stack-v0", "scripted", "rigid-envs/stack/scripted-v0"),
-        ("RigidEnvs/PushT-v0", "trained-PushT-v0", "rigid-envs/push-t/trained-v0"),
+        ("RigidEnvs/PushDense-v0", "ppo (runs/a b)", {}, "push-dense/ppo"),
+        ("RigidEnvs/Push-v0", "scripted", {"reward_type": "dense"}, "push-dense/scripted"),
+        ("RigidEnvs/PushDense-v0", "scripted", {"reward_type": "sparse"}, "push/scripted"),
+        ("RigidEnvs/Stack-v0", "scripted", {"blocks": 3, "fidelity": "fast"},
+         "stack/scripted-blocks-3"),
+        ("RigidEnvs/PushT-v0", "trained-PushT-v0", {}, "push-t/trained"),
     ],
-)
-def test_names(env_id, policy, expected):
-    assert default_id(env_id, policy) == expected
+)  # fmt: skip
+def test_names(env_id, policy, arguments, expected):
+    assert default_id(env_id, policy, arguments, (0.0, 0.0)) == f"rigid-envs/{expected}-v0"
 
 
 @pytest.mark.parametrize(
@@ -215,6 +218,8 @@ def test_names(env_id, policy, expected):
         (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--dataset-id", "x/push-v0"], "parts of at least two letters, digits, - or _"),
         (["--dataset-id", "ä/push-v0"], "should be like rigid-envs/push/scripted-v0"),
+        (["--env-kwargs", "max_episode_steps:-1"], "max_episode_steps is -1, should be at least"),
+        (["--env-kwargs", "obs_type:pixels"], "a scripted controller acts from the state"),
         (["--env-kwargs", "slowdown:0.5"], "'slowdown' is not allowed here: it is no argument"),
         (["--episodes", "0"], "should be an integer of at least 1"),
         (["--action-noise", "-0.1"], "action_noise is -0.1, should be a number of at least 0"),
@@ -241,3 +246,13 @@ def test_the_command_writes_a_dataset(capsys):
     assert "mine/few-v0: 3 episodes, 150 steps" in shown
     assert 'minari.load_dataset("mine/few-v0")' in shown
     assert minari.load_dataset("mine/few-v0").total_episodes == 3
+
+
+@pytest.mark.parametrize("policy", [scripted_policy(PUSH), shipped_policy(PUSH)])
+def test_a_policy_of_the_state_records_pixels(policy):
+    pixels = {"obs_type": "pixels+state", "pixel_size": 16}
+    written = write_dataset(policy, 20, "seen-v0", **pixels)
+    assert written.success > 0.8
+    episode = minari.load_dataset("seen-v0")[0]
+    assert episode.observations["observation"].shape == (51, 16, 16, 3)
+    assert episode.observations["state"].shape == (51, 22)

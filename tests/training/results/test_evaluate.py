@@ -97,6 +97,23 @@ def test_numbers_out_of_range_raise(solver, tmp_path):
         record(solver, tmp_path / "video.avi")
 
 
+def test_episodes_without_an_end_raise(solver, tmp_path):
+    with pytest.raises(UsageError, match=r"max_episode_steps is -1, should be at least 1"):
+        evaluate(solver, 5, max_episode_steps=-1)
+    with pytest.raises(UsageError, match=r"max_episode_steps is -1, should be at least 1"):
+        record(solver, tmp_path / "a.mp4", max_episode_steps=-1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_scripted_controller_acts_from_the_state_beside_pixels():
+    push = "RigidEnvs/Push-v0"
+    seen = {"obs_type": "pixels+state", "pixel_size": 16}
+    plain, other = (evaluate(scripted_policy(push, **a), 20, quiet=True) for a in ({}, seen))
+    np.testing.assert_array_equal(plain.episode_return, other.episode_return)
+    with pytest.raises(UsageError, match="obs_type is 'pixels', should be 'state' or"):
+        scripted_policy(push, obs_type="pixels")
+
+
 def test_unknown_environment_suggests_the_nearest():
     policy = Policy(straight_to_the_goal, "RigidEnvs/Posh-v0", "solver")
     with pytest.raises(UsageError, match=r"did you mean 'RigidEnvs/Push-v0'\?"):

@@ -7,10 +7,11 @@ import pytest
 from tests.training.results.recorded import PLACE, change, update
 from training.policies.policy_file import read_policy
 from training.results.evaluate import evaluate
-from training.results.result import read_results, task_name
+from training.results.result import read_results
 from training.results.results import SOURCE
 from training.settings.errors import UsageError
 from training.settings.seed_ranges import EVALUATION
+from training.settings.tasks import task_name
 
 
 def test_shipped_policies_are_small_and_as_good_as_recorded():

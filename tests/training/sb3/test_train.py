@@ -12,6 +12,7 @@ from training.runs.run_folder import LOCK
 from training.sb3 import train as train_module
 from training.sb3.build import LinearSchedule, worlds_and_model
 from training.sb3.train import train
+from training.settings.algorithms import SACConfig
 from training.settings.errors import UsageError
 
 
@@ -109,6 +110,17 @@ def test_checkpoints_are_saved_during_training(quick_ppo, tmp_path, monkeypatch)
     with pytest.raises(RuntimeError, match="power cut"):
         train(quick_ppo, tmp_path, save_every=80, quiet=True)
     assert trained_policy(tmp_path / "ppo" / "Test-Reach-v0_1")
+
+
+def test_her_without_a_complete_episode_is_reported_before_a_folder_is_created(tmp_path):
+    config = SACConfig(
+        env_id="RigidEnvs/Reach-v0", n_envs=4, n_timesteps=400, learning_starts=99, eval_freq=0,
+        batch_size=32, buffer_size=1000, replay_buffer_class="HerReplayBuffer",
+    )  # fmt: skip
+    message = "learning_starts is 99, should be at least n_envs × max_episode_steps = 100: HER"
+    with pytest.raises(UsageError, match=message):
+        train(config, tmp_path, quiet=True)
+    assert not list(tmp_path.iterdir())
 
 
 def test_linear_schedule_falls_to_zero():
