@@ -65,14 +65,22 @@ def trained(config: TrainConfig, folder: Path) -> tuple[RunFolder, float]:
     Raises:
         KeyboardInterrupt: the training was interrupted.
     """
-    runs = [RunFolder(file.parent) for file in sorted(folder.rglob("run.json"))]
-    same = [run for run in runs if run.checkpoints() and run.config() == config]
-    if same and (state := read_state(same[-1].checkpoint))["finished"]:
-        return same[-1], float(state["seconds"])
+    runs = [RunFolder(file.parent) for file in folder.rglob("run.json")]
+    same = [run for run in runs if run.checkpoints() and _has_settings(run, config)]
+    for run in same:
+        if (state := read_state(run.checkpoint))["finished"]:
+            return run, float(state["seconds"])
     result = resume(same[-1], quiet=True) if same else train(config, folder, quiet=True)
     if result.interrupted:
         raise KeyboardInterrupt
     return result.folder, result.seconds
+
+
+def _has_settings(run: RunFolder, config: TrainConfig) -> bool:
+    try:
+        return run.config() == config
+    except UsageError:  # damaged, or of an older version
+        return False
 
 
 def success(policy: Policy, preset: str, episodes: int = EPISODES) -> float:

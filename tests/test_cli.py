@@ -53,6 +53,21 @@ def test_every_command_has_help(command, capsys):
         ([], "COMMAND"),
         (["trian"], "invalid choice: 'trian'"),
         (["train", "--algo", "pp0"], "did you mean 'ppo'?"),
+        (
+            ["train", "--algo", "sac", "--env", "RigidEnvs/Reach-v0"],
+            "no settings for environment 'RigidEnvs/Reach-v0'; there are those of",
+        ),
+        (
+            ["train", "--env", "RigidEnvs/Stack-v0", "--env-kwargs", "observe_task_guide:false"],
+            "observe_task_guide is False, but the components in policy_kwargs are those of an",
+        ),
+        (["train", "--env-kwargs", "obs_type:pixels"], "training.policies.pixels.PixelPolicy of"),
+        (["evaluate", "RigidEnvs/Push-v0"], "is an environment, should come after --env"),
+        (["evaluate", "--env-kwargs", "obstacles:2", "runs/a"], "goes before --env-kwargs"),
+        (
+            ["scripted", "--env-kwargs", "max_episode_steps:-1"],
+            "max_episode_steps is -1, should be",
+        ),
         (["train", "--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
         (["train", "-n", "0"], "should be an integer of at least 1"),
         (["train", "-n", "many"], "should be an integer of at least"),

@@ -138,7 +138,10 @@ class Randomization:
     def check_step(self, world: World, ranges: Mapping[str, tuple[float, float]]) -> None:
         """Raises ValueError for ranges in which the time step would not be stable."""
         low, high = (self._split(end[None]) for end in np.moveaxis(self._limits(ranges), -1, 0))
-        world.check_parameters({name: (low[name][0], high[name][0]) for name in low})
+        try:
+            world.check_parameters({name: (low[name][0], high[name][0]) for name in low})
+        except ValueError as error:
+            raise ValueError(f"randomize={dict(ranges)}: {error}") from None
 
     def set_ranges(self, mask: Array, ranges: Mapping[str, tuple[float, float]] | None) -> None:
         """Sets the ranges of the worlds of the mask; None restores those of the constructor."""

@@ -73,9 +73,9 @@ class Demand:
         slots = 0
         for node in ray.nodes():
             if node["Alive"]:
-                free = node["Resources"]
-                fit = int(free.get("CPU", 0)) // self.threads
-                slots += min(fit, int(free.get("GPU", 0)) // self.gpus) if self.gpus else fit
+                total = node["Resources"]
+                fit = int(total.get("CPU", 0)) // self.threads
+                slots += min(fit, int(total.get("GPU", 0)) // self.gpus) if self.gpus else fit
         return max(slots, 1)
 
 

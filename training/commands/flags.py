@@ -215,7 +215,7 @@ def add_dataset(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dataset-id",
         metavar="NAME",
-        help="name in Minari (default: of environment and policy, as rigid-envs/push/scripted-v0)",
+        help="name in Minari (default: of task and policy, as rigid-envs/push/scripted-v0)",
     )
     parser.add_argument("--seed", type=whole, help="seed of the first episode (default: 2000000)")
     parser.add_argument(

@@ -66,9 +66,9 @@ def evaluate(options: argparse.Namespace) -> int:
     """Prints the success rate of a policy."""
     from training.results import evaluate as evaluation
 
+    kwargs = env_kwargs_of(options, evaluation.evaluate)
     policy = policy_of(options)
     seed = EVALUATION if options.seed is None else options.seed
-    kwargs = env_kwargs_of(options, evaluation.evaluate)
     result = evaluation.evaluate(policy, options.n_episodes, seed=seed, **kwargs)
     evaluation.print_evaluation(policy, result)
     return 0
@@ -233,8 +233,13 @@ def dataset(options: argparse.Namespace) -> int:
     kwargs = env_kwargs_of(options, minari_store.write_dataset)
     if options.policy == minari_store.RANDOM:
         policy = minari_store.random_policy(options.env or DEFAULT_ENV, options.seed or 0, **kwargs)
-    else:
+    elif options.policy in ("scripted", "trained") or Path(options.policy).exists():
         policy = policy_of(options)
+    else:
+        raise UsageError(
+            f"--policy is {options.policy!r}, should be scripted, trained, random, a run folder or "
+            "a .safetensors file"
+        )
     written = minari_store.write_dataset(
         policy,
         options.n_episodes,

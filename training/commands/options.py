@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 # names that --env-kwargs must not contain, because the commands set them, and the alternative
 RESERVED = {
     "seed": "use --seed",
+    "episodes": "use -n",
     "num_envs": "use --n-envs of train or --num-worlds of view",
     "env_id": "use --env, or for play the first argument",
     "render_mode": "the command sets it",
@@ -58,6 +59,15 @@ def _with_flags(config: "TrainConfig", options: argparse.Namespace) -> "TrainCon
             own = changes.get(group, getattr(config, group))
             if group == "env_kwargs" or name in own:
                 changes[group] = {**own, name: value}
+    before, after = (
+        kwargs.get("observe_task_guide", False)
+        for kwargs in (config.env_kwargs, changes.get("env_kwargs", config.env_kwargs))
+    )
+    if after != before and "components" in config.policy_kwargs and "policy_kwargs" not in changes:
+        raise UsageError(
+            f"observe_task_guide is {after}, but the components in policy_kwargs are those of an "
+            f"observation where it is {before}: give policy_kwargs too, by --hyperparams"
+        )
     if "n_timesteps" in changes and not own_stage:
         return config.with_steps(changes.pop("n_timesteps"), **changes)
     return config.replace(**changes)
@@ -131,6 +141,11 @@ def policy_of(options: argparse.Namespace) -> "Policy":
     if options.policy == SCRIPTED:
         return scripted_policy(
             options.env or DEFAULT_ENV, **env_kwargs_of(options, scripted_policy)
+        )
+    if options.policy is not None and options.policy.startswith("RigidEnvs/"):
+        raise UsageError(
+            f"{options.policy} is an environment, should come after --env; a policy is a run "
+            'folder, a .safetensors file, "trained" or "scripted"'
         )
     if options.policy == SHIPPED:
         return shipped_policy(options.env or DEFAULT_ENV)

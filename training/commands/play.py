@@ -40,8 +40,8 @@ def action_of(held: Iterable[str], components: int, *, closed: bool, azimuth: fl
 
     Args:
         held: Names of the keys.
-        components: Number of components of the action: displacement along x and y, perhaps along z,
-            perhaps grip.
+        components: Number of components of the action: displacement along x and y; along x, y and
+            z; or these and the grip.
         closed: Whether to close the gripper.
         azimuth: Azimuth of the camera in degrees; keys move along the axis that is nearest to the
             direction in the frame.

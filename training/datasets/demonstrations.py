@@ -11,7 +11,7 @@ from training.settings.algorithms import SACConfig
 from training.settings.environment_ids import plain_id
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError
-from training.settings.tasks import changed_arguments
+from training.settings.tasks import changed_arguments, task_defaults
 
 Array = np.ndarray
 
@@ -41,16 +41,17 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
             'pip install -c constraints.txt ".[data]"'
         )
     import minari
+    from minari.storage import get_dataset_path
 
+    if not get_dataset_path(name).exists():
+        raise UsageError(
+            f"demonstrations is {name!r}, but there is no such dataset; it should be one in "
+            "Minari's folder, as `rigid-envs dataset` writes it and `minari list local` shows it"
+        )
     try:
         dataset = minari.load_dataset(name)
         episodes = [_recorded(episode) for episode in dataset.iterate_episodes()]
         spec = dataset.spec.env_spec
-    except FileNotFoundError:
-        raise UsageError(
-            f"demonstrations is {name!r}, but there is no such dataset; it should be one in "
-            "Minari's folder, as `rigid-envs dataset` writes it and `minari list local` shows it"
-        ) from None
     except Exception as error:  # Minari and h5py raise exceptions of many types
         reason = " ".join(str(error).split())
         raise UsageError(
@@ -64,8 +65,6 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
 def _recorded(episode: Any) -> Recorded:
     actions, infos = np.asarray(episode.actions), episode.infos or {}
     intended = infos.get("intended_action")
-    if "is_success" not in infos:
-        raise ValueError("its episodes have no infos['is_success']")
     return Recorded(
         seed=-1,
         observations={key: np.asarray(values) for key, values in episode.observations.items()},
@@ -74,7 +73,7 @@ def _recorded(episode: Any) -> Recorded:
         rewards=np.asarray(episode.rewards),
         terminated=np.asarray(episode.terminations, dtype=bool),
         truncated=np.asarray(episode.truncations, dtype=bool),
-        success=np.asarray(infos["is_success"], dtype=bool),
+        success=np.asarray(infos.get("is_success", False), dtype=bool),
     )
 
 
@@ -100,7 +99,8 @@ def _check(config: SACConfig, spec: Any, episodes: list[Recorded]) -> None:
             f"--env-kwargs reward_type:{reward_type}"
         )
     for name in sorted({*_task_of(own), *_task_of(spec)}):
-        recorded, wanted = (one.kwargs.get(name) for one in (spec, own))
+        default = task_defaults(own.id).get(name)
+        recorded, wanted = (one.kwargs.get(name, default) for one in (spec, own))
         if recorded != wanted:
             raise UsageError(
                 f"{start} {env_id} with {name} {recorded!r}; training has {wanted!r}: record it "

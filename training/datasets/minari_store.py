@@ -10,10 +10,11 @@ import json
 import os
 import re
 import tempfile
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -47,7 +48,9 @@ WORLDS = 1024
 REFERENCE_EPISODES = 100
 FOLDER = "MINARI_DATASETS_PATH"
 """Environment variable with Minari's folder of datasets."""
-_NAME = re.compile(r"(?:[-\w]{2,}/)*[-\w]+-v\d+", re.ASCII)  # what Minari can read back
+# what Minari can read back; it takes a folder with an entry `data` for a dataset
+_NAME = re.compile(r"(?:(?!data/)[-\w]{2,}/)*[-\w]+-v\d+", re.ASCII)
+_LOCK = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,8 @@ def write_dataset(
     Args:
         policy: what acts.
         episodes: their number.
-        dataset_id: (namespace/)name-v0; by default from environment, policy, noise and slowdown.
+        dataset_id: (namespace/)name-v0; by default of policy, noise, slowdown and environment,
+            with the arguments that make another task.
         seed: of the first episode.
         action_noise: standard deviation of normal noise on the actions, whose bounds are 1. What
             is recorded as actions is what the environment took, clipped to its bounds; so the
@@ -217,13 +221,11 @@ def _play(
 def _scores(policy: Policy, arguments: dict[str, Any]) -> tuple[float, float | None]:
     """Mean returns of random actions, and of the policy; of the scripted one if it is random.
 
-    A scripted controller reads the state, so there is no expert where pixels are observed.
+    There is no expert where a scripted controller is missing, or does not see the state.
     """
     low = _mean_return(random_policy(policy.env_id, **arguments))
     expert = policy
     if policy.name == RANDOM:
-        if arguments.get("obs_type", "state") != "state":
-            return low, None
         try:
             expert = scripted_policy(policy.env_id, **arguments)
         except UsageError:
@@ -306,23 +308,37 @@ def _placed(name: str, replace_existing: bool, write: Callable[[], None]) -> Pat
     """Writes a dataset in a folder that Minari does not list, then moves it to its place.
 
     So a dataset that is replaced stays until the new one is complete, and nothing of an incomplete
-    one is seen, however this process ends.
+    one is seen, however this process ends. One that is killed may leave a folder `.unfinished-*`.
     """
-    path, root = _check_free(name, replace_existing), Path(get_dataset_path())
-    try:
-        with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=root) as folder:
-            with _datasets_in(folder):
-                write()
-            namespace = name.rpartition("/")[0]
-            if namespace and namespace not in list_local_namespaces():
-                create_namespace(namespace)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if _check_free(name, replace_existing).exists():  # written meanwhile, or to be replaced
-                path.rename(Path(folder) / "replaced")
-            (Path(folder) / name).rename(path)
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error}") from None
+    with _LOCK:  # the folder is an environment variable, which threads share
+        path, root = Path(get_dataset_path(name)), Path(get_dataset_path())
+        try:
+            with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=root) as folder:
+                with _datasets_in(folder):
+                    write()
+                namespace = name.rpartition("/")[0]
+                if namespace and namespace not in list_local_namespaces():
+                    with suppress(ValueError):  # another process was faster
+                        create_namespace(namespace)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if _check_free(name, replace_existing).exists():
+                    _exchange(Path(folder) / name, path, Path(folder) / ".replaced")
+                else:
+                    (Path(folder) / name).rename(path)
+        except OSError as error:
+            raise UsageError(f"{path} cannot be written: {error}") from None
     return path
+
+
+def _exchange(new: Path, path: Path, old: Path) -> None:
+    """Moves `new` to `path`, and what was there to `old`; if that fails, it is there again."""
+    path.rename(old)
+    try:
+        new.rename(path)
+    except BaseException:
+        if not path.exists():
+            old.rename(path)
+        raise
 
 
 @contextmanager

@@ -228,7 +228,9 @@ def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None
     elif env_id != environment.id:
         env_kwargs = {**env_kwargs, **registered_arguments(env_id)}
     name = f"{content.header.algorithm} ({path})"
-    act = content.act if content.header.network.keypoints is not None else of_state(content.act)
+    from_pixels = content.header.network.keypoints is not None
+    own = from_pixels or "state" in content.header.observation
+    act = content.act if own else of_state(content.act)
     return Policy(act, env_id or environment.id, name, env_kwargs, path.parent)
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
-from training.policies.policy import SCRIPTED, Policy
+from training.policies.policy import SCRIPTED, Policy, of_state
 from training.policies.policy_file import SUFFIX, read_policy
 from training.runs.run_folder import RunFolder
 from training.settings.algorithms import ALGORITHMS
@@ -155,7 +156,11 @@ def _unpickled(
         actions, _ = model.predict(observation, deterministic=deterministic)
         return actions
 
-    return Policy(act, env_id, f"{algo} ({file})", env_kwargs, folder.path)
+    observed = model.observation_space
+    own = isinstance(observed, spaces.Dict) and "state" in observed.spaces
+    return Policy(
+        act if own else of_state(act), env_id, f"{algo} ({file})", env_kwargs, folder.path
+    )
 
 
 def _load_model(file: Path, algo: str, device: str) -> Any:

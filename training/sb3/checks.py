@@ -92,14 +92,22 @@ def _check_her(config: TrainConfig, envs: Any) -> None:
     """Raises UsageError if HER is configured and cannot recompute the reward from goals."""
     if not isinstance(config, SACConfig) or config.replay_buffer_class is None:
         return
-    steps = envs.spec.max_episode_steps if envs.spec is not None else None
-    limit = config.env_kwargs.get("max_episode_steps", steps)
-    complete = None if limit is None else config.n_envs * limit
-    early = bool(config.env_kwargs.get("terminate_on_success"))
-    if complete is not None and config.learning_starts < complete and not early:
+    registered = envs.spec.max_episode_steps if envs.spec is not None else None
+    limit = config.env_kwargs.get("max_episode_steps") or registered
+    if limit == -1:
+        raise UsageError(
+            f"{config.env_id}: max_episode_steps is -1, should be at least 1 in training: "
+            "HerReplayBuffer samples from complete episodes"
+        )
+    # the first update follows the first rollout that ends after learning_starts
+    first = (config.learning_starts // config.rollout + 1) * config.rollout
+    ends_early = bool(config.env_kwargs.get("terminate_on_success"))
+    complete = 0 if limit is None or ends_early else config.n_envs * limit
+    if first < complete:
         raise UsageError(
             f"{config.env_id}: learning_starts is {config.learning_starts}, should be at least "
-            f"n_envs × max_episode_steps = {complete}: HER samples from complete episodes"
+            f"n_envs × max_episode_steps = {complete}, or n_timesteps is too small: "
+            "HerReplayBuffer samples from complete episodes"
         )
     goal = np.zeros((1, *envs.single_observation_space["desired_goal"].shape))
     try:

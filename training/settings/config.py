@@ -265,13 +265,14 @@ class TrainConfig:
                 if name in self.policy_kwargs and self.policy not in policies:
                     required = f"policy: {' or '.join(policies)}" if policies else "algorithm ppo"
                     raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
-        observed = str(self.final_env_kwargs.get("obs_type", "state"))
-        if observed.startswith("pixels") != (self.policy in self.pixel_policies):
-            raise UsageError(
-                f"{where}: policy is {self.policy} with obs_type {observed}: "
-                "training.policies.pixels.PixelPolicy acts from pixels, as in configs/pixels.yaml, "
-                "the other policies from the state"
-            )
+        for kwargs in (self.env_kwargs, self.final_env_kwargs):
+            observed = str(kwargs.get("obs_type", "state"))
+            if observed.startswith("pixels") != (self.policy in self.pixel_policies):
+                raise UsageError(
+                    f"{where}: policy is {self.policy} with obs_type {observed}: "
+                    "training.policies.pixels.PixelPolicy of ppo acts from pixels, as in "
+                    "configs/pixels.yaml, the other policies from the state"
+                )
         first = self.policy_kwargs.get("log_std_init")
         if isinstance(first, list) and self.policy not in self.bounded_policies:
             raise UsageError(

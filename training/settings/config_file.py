@@ -10,8 +10,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import yaml
 
+import rigid_envs  # noqa: F401  (registers the ids)
 from training.settings.algorithms import ALGORITHMS
 from training.settings.config import TrainConfig
 from training.settings.data_folders import data_folder
@@ -56,7 +58,8 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
         names = [str(name) for name in entries]
         raise UsageError(
             f"{source}: no settings for environment {env_id!r}; "
-            f"did you mean {nearest(env_id, names)!r}? It has {', '.join(names)}; "
+            + ("" if env_id in gym.registry else f"did you mean {nearest(env_id, names)!r}? ")
+            + f"there are those of {', '.join(names)}; "
             + ("HER needs the sparse reward; " if algo == "sac" and "Dense" in env_id else "")
             + "to use your own settings: --config FILE"
         )
@@ -88,9 +91,9 @@ def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:
     for word in words:
         key, colon, value = word.partition(":")
         if not key or not colon:
-            raise UsageError(
-                f"{source}: {word!r} should be KEY:VALUE; a run or policy goes before {source}"
-            )
+            last = source == "--env-kwargs" and "=" not in word
+            hint = f"; a run or policy goes before {source}" if last else ""
+            raise UsageError(f"{source}: {word!r} should be KEY:VALUE{hint}")
         try:
             settings[key] = yaml.safe_load(value)
         except yaml.YAMLError:

@@ -1,7 +1,7 @@
 """Seeds of episodes: ranges that are far from each other, and from training, which starts at 0."""
 
 LIMIT = 2**32
-"""Upper bound of a run's seed, which is NumPy's."""
+"""Seeds of runs are below this number, as NumPy requires."""
 EVALUATION = 1_000_000
 """First seed of recorded results and `evaluate`."""
 DATASET = 2_000_000

@@ -1,5 +1,6 @@
 """Which task an environment and its arguments define."""
 
+import inspect
 import json
 import re
 from typing import Any
@@ -7,11 +8,13 @@ from typing import Any
 import gymnasium as gym
 
 import rigid_envs  # noqa: F401  (registers the ids)
+from rigid_envs.tasks import TASKS
 from training.settings.environment_ids import folder_name, plain_id
 
 SAME_TASK = (
     "reward_type", "fidelity", "observe_task_guide",
-    "pixel_size", "camera",
+    "pixel_size", "camera", "width", "height", "show_forces", "show_particles", "render_worlds",
+    "threads",
 )  # fmt: skip
 """Arguments of the environment that do not change the task to be solved."""
 
@@ -23,8 +26,8 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
 
     Args:
         env_id: Environment id.
-        arguments: Its arguments. The name omits those of SAME_TASK, those that are false or 0, and
-            a `max_episode_steps` equal to the registered one.
+        arguments: Its arguments. The name omits those of SAME_TASK, those that are false, 0 or the
+            default of the task, and a `max_episode_steps` equal to the registered one.
     """
     words = [folder_name(plain_id(env_id))]
     for name in changed_arguments(env_id, arguments):
@@ -33,10 +36,19 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
     return "-".join(words)
 
 
+def task_defaults(env_id: str) -> dict[str, Any]:
+    """Arguments of a task of this project and their defaults; empty for other environments."""
+    spec = gym.registry.get(env_id)
+    task = TASKS.get(str(spec.kwargs.get("task"))) if spec is not None else None
+    parameters = inspect.signature(task).parameters.values() if task is not None else ()
+    return {one.name: one.default for one in parameters}
+
+
 def changed_arguments(env_id: str, arguments: dict[str, Any]) -> list[str]:
     """Names of the arguments that make another task than the registered one, see `task_name`."""
     spec = gym.registry.get(env_id)
-    changed = {name for name, value in arguments.items() if value}
+    usual = task_defaults(env_id)
+    changed = {n for n, value in arguments.items() if value and value != usual.get(n)}
     if spec is not None and arguments.get("max_episode_steps") == spec.max_episode_steps:
         changed.discard("max_episode_steps")
     return sorted(changed - set(SAME_TASK))

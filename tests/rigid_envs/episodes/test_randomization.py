@@ -337,6 +337,7 @@ def test_gymnasiums_checker_accepts_randomization(recwarn):
         ({"friction": (-0.1, 1)}, ValueError, "randomize['friction'] must be at least 0"),
         ({"restitution": (0, 1.5)}, ValueError, "at least 0 and at most 1, got (0, 1.5)"),
         ({"noise": (0, np.nan)}, ValueError, "randomize['noise'] high must be finite, got nan"),
+        ({"size": (1e-4, 1)}, ValueError, "randomize={'size': (0.0001, 1"),
         ({"size": (1e-4, 1)}, ValueError, "is too small for Fidelity.substep"),
         ([("mass", (1, 2))], TypeError, "randomize must be a dict"),
     ],

@@ -216,6 +216,13 @@ def test_a_wrong_address_is_reported_before_any_folder_is_created(
     assert not list(tmp_path.iterdir())
 
 
+def test_as_many_tasks_run_at_a_time_as_nodes_have_cpus_and_gpus(monkeypatch):
+    both, cpus = {"CPU": 8.0, "GPU": 2.0}, {"CPU": 4.0}
+    nodes = [{"Alive": True, "Resources": each} for each in (both, cpus)]
+    monkeypatch.setattr(ray, "nodes", lambda: nodes)
+    assert [Demand.of(2, one).slots() for one in ("cpu", "auto", "cuda")] == [6, 6, 2]
+
+
 def test_more_threads_than_a_node_has_are_rejected(address, tmp_path, capsys):
     words = ["train", "--env", REACH, "-f", str(tmp_path), "--num-threads", "2"]
     assert cli.main([*words, "--ray", address]) == 2

@@ -111,6 +111,19 @@ def test_ctrl_c_ends_the_series(words, tmp_path, monkeypatch):
     assert len(list((tmp_path / "runs" / "ppo").iterdir())) == 1
 
 
+def test_ctrl_c_after_a_failure_names_the_failure_and_still_counts_as_ctrl_c(
+    words, monkeypatch, capsys
+):
+    errors = iter([UsageError("the disk is full"), KeyboardInterrupt()])
+
+    def fails(*_arguments, **_options):
+        raise next(errors)
+
+    monkeypatch.setattr("stable_baselines3.PPO.learn", fails)
+    assert cli.main([*words, "--seeds", "0-2"]) == 130
+    assert "1 of 3 runs failed: seed 0: the disk is full" in capsys.readouterr().err
+
+
 def test_ray_names_its_extra_where_it_is_missing(words, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(handlers, "RAY_EXTRA", (*extras.TRAIN_EXTRA, "no_such_package"))
     for more in (["--ray"], ["--ray", "localhost:6379", "--seeds", "0-1"]):

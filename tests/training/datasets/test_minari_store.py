@@ -1,9 +1,7 @@
 """Datasets: Minari reads them back, its environment steps, and episodes can be played again."""
 
-import contextlib
 import os
-import signal
-from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -165,35 +163,48 @@ def test_an_error_leaves_what_was_there(folder):
     assert [path.name for path in folder.iterdir()] == ["kept-v0"]
 
 
-def test_a_dataset_that_another_process_wrote_meanwhile_is_kept(folder):
+def test_a_dataset_that_another_process_wrote_meanwhile_is_kept(folder, monkeypatch):
     policy = random_policy(PUSH, **FAST)
+    write_dataset(policy, 3, "other-v0")
+    write = minari_store._write
 
-    def act(observation):
-        if not (folder / "same-v0").exists():
-            write_dataset(policy, 3, "same-v0")
-        return policy.act(observation)
+    def both(*arguments):
+        write(*arguments)
+        (folder / "other-v0").rename(folder / "same-v0")
 
+    monkeypatch.setattr(minari_store, "_write", both)
     with pytest.raises(UsageError, match="'same-v0' exists"):
-        write_dataset(replace(policy, act=act), 2, "same-v0")
-    assert minari.load_dataset("same-v0").total_episodes == 3
+        write_dataset(policy, 2, "same-v0")
     assert [path.name for path in folder.iterdir()] == ["same-v0"]
+    assert minari.load_dataset("same-v0").total_episodes == 3
 
 
-def test_a_dataset_to_be_replaced_stays_until_the_new_one_is_complete(folder, monkeypatch):
-    policy = random_policy(PUSH, **FAST)
-    write_dataset(policy, 3, "mine/same-v0")
+@pytest.mark.parametrize("fails_at", ["write", "rename"])
+def test_a_dataset_to_be_replaced_is_kept_if_anything_fails(folder, monkeypatch, fails_at):
+    policy, name = random_policy(PUSH, **FAST), "replaced/same-v0"
+    write_dataset(policy, 3, name)
+    write, rename = minari_store._write, Path.rename
 
-    def killed(*_, **__):
-        assert minari.load_dataset("mine/same-v0").total_episodes == 3
-        assert list(minari.list_local_datasets()) == ["mine/same-v0"]
-        os.kill(os.getpid(), signal.SIGINT)
+    def writing(*arguments):
+        write(*arguments)
+        if fails_at == "write":
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr(minari_store, "_write", killed)
-    monkeypatch.setattr(minari_store, "_datasets_in", contextlib.nullcontext)
-    with pytest.raises(KeyboardInterrupt):
-        write_dataset(policy, 2, "mine/same-v0", replace_existing=True)
-    assert minari.load_dataset("mine/same-v0").total_episodes == 3
-    assert [path.name for path in folder.iterdir()] == ["mine"]
+    def renaming(path, target):
+        if fails_at == "rename" and path.name == "same-v0" and ".unfinished" in str(path.parent):
+            raise KeyboardInterrupt
+        return rename(path, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(minari_store, "_write", writing)
+        patched.setattr(Path, "rename", renaming)
+        with pytest.raises(KeyboardInterrupt):
+            write_dataset(policy, 2, name, replace_existing=True)
+    assert minari.load_dataset(name).total_episodes == 3
+    assert [path.name for path in folder.iterdir()] == ["replaced"]
+    write_dataset(policy, 2, name, replace_existing=True)
+    assert minari.load_dataset(name).total_episodes == 2
+    assert os.environ["MINARI_DATASETS_PATH"] == str(folder)
 
 
 @pytest.mark.parametrize(
@@ -217,6 +228,7 @@ def test_names(env_id, policy, arguments, expected):
         (["--dataset-id", "no version"], "name of the dataset is 'no version', should be like"),
         (["--dataset-id", "../up-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--dataset-id", "x/push-v0"], "parts of at least two letters, digits, - or _"),
+        (["--dataset-id", "data/push-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--dataset-id", "ä/push-v0"], "should be like rigid-envs/push/scripted-v0"),
         (["--env-kwargs", "max_episode_steps:-1"], "max_episode_steps is -1, should be at least"),
         (["--env-kwargs", "obs_type:pixels"], "a scripted controller acts from the state"),
@@ -225,7 +237,7 @@ def test_names(env_id, policy, arguments, expected):
         (["--action-noise", "-0.1"], "action_noise is -0.1, should be a number of at least 0"),
         (["--slowdown", "1.5"], "slowdown is 1.5, should be a number from 0 to 1"),
         (["--action-noise", "nan"], "action_noise is nan, should be a number of at least 0"),
-        (["--policy", "nowhere"], "nowhere"),
+        (["--policy", "nowhere"], "--policy is 'nowhere', should be scripted, trained, random"),
         (["--env", "RigidEnvs/Posh-v0"], "did you mean 'RigidEnvs/Push-v0'?"),
         (["--env-kwargs", "fidelity:quick"], "quick"),
     ],

@@ -144,7 +144,7 @@ def test_wrong_settings_name_what_is_required():
     with pytest.raises(UsageError, match="keypoints is an integer of at least 1 and at most 1024"):
         config(policy_kwargs={"keypoints": 1025})
     pictures = {**PICTURES, "pixel_size": 36}
-    with pytest.raises(UsageError, match=r"MultiInputPolicy with obs_type pixels: training\.pol"):
+    with pytest.raises(UsageError, match=r"MultiInputPolicy with obs_type pixels\+state: train"):
         config(policy="MultiInputPolicy", policy_kwargs={}, env_kwargs=pictures)
     with pytest.raises(UsageError, match=r"critic requires obs_type=.pixels\+state"):
         StateFeatures(spaces.Dict({"observation": picture, **goals}))

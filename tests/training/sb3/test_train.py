@@ -114,13 +114,19 @@ def test_checkpoints_are_saved_during_training(quick_ppo, tmp_path, monkeypatch)
 
 def test_her_without_a_complete_episode_is_reported_before_a_folder_is_created(tmp_path):
     config = SACConfig(
-        env_id="RigidEnvs/Reach-v0", n_envs=4, n_timesteps=400, learning_starts=99, eval_freq=0,
+        env_id="RigidEnvs/Reach-v0", n_envs=4, n_timesteps=400, learning_starts=95, eval_freq=0,
         batch_size=32, buffer_size=1000, replay_buffer_class="HerReplayBuffer",
     )  # fmt: skip
-    message = "learning_starts is 99, should be at least n_envs × max_episode_steps = 100: HER"
+    message = "learning_starts is 95, should be at least n_envs × max_episode_steps = 100, or"
     with pytest.raises(UsageError, match=message):
         train(config, tmp_path, quiet=True)
+    endless = config.replace(
+        env_kwargs={"max_episode_steps": -1}, eval_env_kwargs={"max_episode_steps": 25}
+    )
+    with pytest.raises(UsageError, match="max_episode_steps is -1, should be at least 1 in train"):
+        train(endless, tmp_path, quiet=True)
     assert not list(tmp_path.iterdir())
+    train(config.replace(learning_starts=96), tmp_path, quiet=True)  # 100 steps before an update
 
 
 def test_linear_schedule_falls_to_zero():
