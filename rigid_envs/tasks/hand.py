@@ -132,7 +132,7 @@ class Hand:
         return np.asarray(pads[:, -1, 1] - pads[:, -2, 1] - 2.0 * self.PAD)
 
     def commanded_opening(self, now: Readout) -> Array:
-        """Distance [count] m between the pads that the last action asked for."""
+        """Distance [count] m between the pads that the last action commanded."""
         opening = now.reference[:, -1, 1] - now.reference[:, -2, 1] - 2.0 * self.PAD
         return np.clip(opening, 0.0, self.max_opening)
 

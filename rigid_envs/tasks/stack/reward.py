@@ -51,7 +51,7 @@ def reward_terms(cube: NextCube, blocks: int, hand: Array, opened: Array) -> dic
         "grasp": np.where(at_goal, 1.0, grip),
         "place": proximity(path_length(cube.position, cube.goal))
         * np.where(cube.held | at_goal, 1.0, PUSHED),
-        # rises as soon as the action asks for a weaker grip, before the fingers move; a grip that
+        # rises as soon as the action commands a weaker grip, before the fingers move; a grip that
         # still holds a cube of 4 cm earns less than half of it
         "release": at_goal * opened,
     }
