@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report.tables import Table
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
 from physics.granular.pair_forces import BLOCK, filter_touching, make_compute, make_pack
 from physics.granular.simulation import GranularSimulation
@@ -22,13 +21,11 @@ COPIED, TRIES, REPEATS = 2**27, 7, 4000  # bytes, runs, blocks
 
 def make_compute_alone(features: Any) -> Any:
     """Entry point: packs one block of a slab's contacts and computes it again and again."""
-    sources = SOURCES
     pack, compute = make_pack(features), make_compute(features)
 
     @entry
     def compute_alone(heap, constants, scratch, slab, h, repeats):  # type: ignore[no-untyped-def]
         """Contacts in the slab and in the block."""
-        _ = sources
         current = heap.counts[PARITY] % heap.pair.shape[0]
         room, n = heap.pair.shape[2], heap.particle.shape[0]
         pair, particle = heap.pair[current, slab].reshape(2 * room), heap.particle.reshape(4 * n)

@@ -26,7 +26,6 @@ import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, at, large_entry
 from physics.impulse.contact_rows import make_contact_rows
 from physics.model.features import Features
@@ -43,14 +42,12 @@ Array = np.ndarray
 @cache
 def _make_elastic_energy(features: Features) -> Any:
     """Entry point: writes the elastic energy [w] J of the worlds of groups first <= g < last."""
-    sources = SOURCES
     constants, kinematics = make_constants(features), make_kinematics(features)
     compound_frames, impulse = make_compound_frames(features), features.impulse
     half_pair = make_contact_rows(features) if impulse else make_half_pair(features, True)
 
     @large_entry
     def elastic_energy(all_model, state, workspace, chosen, rows, energy, first, last):
-        _ = sources
         state, workspace = bundle(state), bundle(workspace)
         for g in range(first, last):
             model = bundle(constants(all_model, g))

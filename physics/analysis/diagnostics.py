@@ -8,7 +8,6 @@ import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry
 from physics.impulse.contact_rows import make_contact_rows
 from physics.model.contacts import Contacts
@@ -49,7 +48,6 @@ class Report(NamedTuple):
 @cache
 def _make_report(features: Features) -> Any:
     """Entry point: evaluates every candidate of a lane group at its present state."""
-    sources = SOURCES
     constants, kinematics = make_constants(features), make_kinematics(features)
     compound_frames = make_compound_frames(features)
     impulse = features.impulse
@@ -57,7 +55,6 @@ def _make_report(features: Features) -> Any:
 
     @large_entry
     def report(group, state, workspace, chosen, rows):
-        _ = sources
         state, workspace = bundle(state), bundle(workspace)
         model = bundle(constants(group, 0))
         write_static_frames(model, workspace)

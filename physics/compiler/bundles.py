@@ -3,11 +3,12 @@
 Numba passes a named tuple of arrays as all of their parts: data, shape, strides and others, seven
 or more for each array. With thirty arrays the instructions that take these apart and put them
 together again at every call were more than half of a kernel. An entry puts a tuple into a bundle in
-its own stack frame; stages get its address, and read from it what they use. Once they are inlined,
-LLVM sees both ends, and removes the bundle.
+its own stack frame, its arrays as views; stages get its address, and read from it what they use.
+Once they are inlined, LLVM sees both ends, and removes the bundle.
 """
 
 import hashlib
+from itertools import accumulate
 from typing import Any
 
 from llvmlite import ir
@@ -22,17 +23,27 @@ from numba.extending import (
     type_callable,
 )
 
+from physics.compiler.views import View, view_array
+
 _BYTES = ir.IntType(8).as_pointer()
 
 
 class Bundle(types.Type):
-    """The type of a bundle; its name is short, as the names of functions contain it."""
+    """The type of a bundle; its name is short, as the names of functions contain it.
+
+    Attributes:
+        fields: names and types of its entries.
+        offsets: of each entry, bytes; the last one is the size.
+    """
 
     def __init__(self, content: Any) -> None:
-        """`content`: the type of the named tuple."""
-        self.content = content
-        digest = hashlib.sha256(str(content).encode()).hexdigest()[:16]
-        super().__init__(name=f"{content.instance_class.__name__}.{digest}")
+        """`content`: the type of a named tuple of arrays or views."""
+        views = [View.of(x) if isinstance(x, types.Array) else x for x in content.types]
+        self.fields = dict(zip(content.fields, views, strict=True))
+        self.offsets = [0, *accumulate(view.nbytes for view in views)]
+        name = content.instance_class.__name__
+        digest = hashlib.sha256(repr((name, content.fields, views)).encode()).hexdigest()[:16]
+        super().__init__(name=f"{name}.{digest}")
 
 
 @register_model(Bundle)
@@ -46,22 +57,19 @@ class _Fields(AttributeTemplate):
     key = Bundle
 
     def generic_resolve(self, bundle: Bundle, name: str) -> Any:  # type: ignore[override]
-        fields = bundle.content.fields
-        return bundle.content.types[fields.index(name)] if name in fields else None
+        return bundle.fields.get(name)
 
 
-def _place(context: Any, builder: Any, content: Any, pointer: Any, index: int) -> Any:
+def _place(context: Any, builder: Any, pointer: Any, offset: int, view: View) -> Any:
     """The address of an entry of a bundle."""
-    kinds = [context.get_value_type(one) for one in content.types]
-    offset = sum(context.get_abi_sizeof(kind) for kind in kinds[:index])
-    place = builder.gep(pointer, [ir.Constant(ir.IntType(64), offset)])
-    return builder.bitcast(place, kinds[index].as_pointer())
+    place = builder.gep(pointer, [ir.Constant(ir.IntType(64), offset)], inbounds=True)
+    return builder.bitcast(place, context.get_value_type(view).as_pointer())
 
 
 @lower_getattr_generic(Bundle)
 def _load(context: Any, builder: Any, bundle: Bundle, pointer: Any, name: str) -> Any:
-    index = bundle.content.fields.index(name)
-    return builder.load(_place(context, builder, bundle.content, pointer, index))
+    offset = bundle.offsets[list(bundle.fields).index(name)]
+    return builder.load(_place(context, builder, pointer, offset, bundle.fields[name]))
 
 
 def bundle(value: Any) -> Any:
@@ -82,11 +90,12 @@ def _type_bundle(context: Any) -> Any:
 
 @lower_builtin(bundle, types.BaseNamedTuple)
 def _store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    content = signature.args[0]
-    size = sum(context.get_abi_sizeof(context.get_value_type(one)) for one in content.types)
-    words = ir.ArrayType(ir.IntType(64), -(-size // 8))
+    content, kind = signature.args[0], signature.return_type
+    words = ir.ArrayType(ir.IntType(64), kind.offsets[-1] // 8)
     pointer = builder.bitcast(cgutils.alloca_once(builder, words), _BYTES)
-    for index in range(len(content.types)):
-        place = _place(context, builder, content, pointer, index)
-        builder.store(builder.extract_value(arguments[0], index), place)
+    for n, (given, view) in enumerate(zip(content.types, kind.fields.values(), strict=True)):
+        value = builder.extract_value(arguments[0], n)
+        if isinstance(given, types.Array):
+            value = view_array(context, builder, given, value)
+        builder.store(value, _place(context, builder, pointer, kind.offsets[n], view))
     return pointer

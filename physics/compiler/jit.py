@@ -24,8 +24,9 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
-from physics.compiler.code_cache import name_files_by_key
+from physics.compiler.kernel_files import KernelFiles
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
+from physics.compiler.views import View
 
 Array = np.ndarray
 
@@ -40,7 +41,10 @@ LANES = 16
 # `_nrt: False` turns off reference counts: numba would count all arrays of a model and a state with
 # atomic instructions in every call. The price is that kernels can't allocate; working memory comes
 # from Python
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}
+_ENTRY: Any = {
+    "pipeline_class": EntryPipeline, "nogil": True, "no_cfunc_wrapper": True, **_OPTIONS,
+}  # fmt: skip
 _INLINE: Any = {"forceinline": True, "no_cfunc_wrapper": True, **_OPTIONS}
 _STAGE: Any = {"pipeline_class": StagePipeline, **_INLINE}
 
@@ -65,7 +69,7 @@ def at(value: Any, i: int) -> Any:
 
 @overload(at, jit_options=_STAGE, strict=False)
 def _at(value: Any, i: Any) -> Any:
-    if isinstance(value, types.Array):
+    if isinstance(value, types.Array | View):
         return lambda value, i: value[i]
     return lambda value, i: value
 
@@ -83,8 +87,8 @@ def large_entry(function: Any) -> Any:
 def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return _on_records(function)
-    compiled = njit(cache=True, nogil=True, pipeline_class=EntryPipeline, **_OPTIONS)(function)
-    name_files_by_key(compiled)
+    compiled = njit(**_ENTRY)(function)
+    compiled._cache = KernelFiles(function)
     direct: list[Any] = []
     first_call = threading.Lock()  # other threads wait, so a compilation is logged once
 

@@ -27,6 +27,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, Flags, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import Environment
+from numba.core.lowering import Lower
 from numba.core.typed_passes import (
     NativeLowering,
     NoPythonBackend,
@@ -43,8 +44,11 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from physics.compiler.code_cache import StageFile, is_cacheable
+from physics.compiler.code_cache import CodeFile
+from physics.compiler.counting import UseCounters
 from physics.compiler.fusion import fuse_products
+from physics.compiler.identity import NoIdentityError
+from physics.compiler.resolution import RememberingContext
 
 # what remains of numba's default pipeline before the lowering
 _BEFORE_LOWERING = (
@@ -56,6 +60,7 @@ _BEFORE_LOWERING = (
     GenericRewrites,
     ReconstructSSA,
     DeadBranchPrune,  # again: variables are now assigned once, so more conditions are constant
+    UseCounters,
     NopythonTypeInference,
     PreLowerStripPhis,
 )
@@ -155,11 +160,48 @@ class _SequenceLibrary(_LinkedLibrary):
         """Left to the caller, which inlines it."""
 
 
+class _Lower(Lower):
+    """Numba's lowering of a function, without code for reference counts, which kernels lack.
+
+    Numba reads each variable before it is written, and clears it after its last use, to count
+    references; and it asks LLVM for the size of each, for debuggers.
+    """
+
+    def alloca_lltype(self, name: str, lltype: Any, datamodel: Any = None) -> Any:
+        """Room for a variable."""
+        return cgutils.alloca_once(self.builder, lltype, name=name, zfill=False)
+
+    def storevar(self, value: Any, name: str, argidx: Any = None) -> None:
+        """Stores a value into a variable."""
+        self._alloca_var(name, self.typeof(name))
+        if name in self._singly_assigned_vars:
+            self._blk_local_varmap[name] = value
+        else:
+            self.builder.store(value, self.getvar(name))
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        """Lowers an expression; numba takes a pair apart in memory."""
+        if expr.op in ("pair_first", "pair_second"):
+            pair = self.loadvar(expr.value.name)
+            return self.builder.extract_value(pair, 0 if expr.op == "pair_first" else 1)
+        return super().lower_expr(resty, expr)
+
+    def delvar(self, name: str) -> None:
+        """Ends the use of a variable; if nothing was written before, it counts as written twice."""
+        if name not in self._blk_local_varmap:
+            self._singly_assigned_vars.discard(name)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Lowering(NativeLowering):
     """Numba's lowering, into a library of the class that the pipeline names."""
 
     _name: Any = "lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        """Lowers one function."""
+        return _Lower
 
     def run_pass(self, state: Any) -> bool:
         codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
@@ -178,6 +220,7 @@ class EntryPipeline(CompilerBase):
         """The arguments are numba's."""
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
+        self.state.typingctx = RememberingContext(self.state.typingctx)
 
     def symbol(self, number: int) -> int:
         """Makes the names of a function's symbols unique: here numba's running number."""
@@ -207,15 +250,18 @@ class StagePipeline(EntryPipeline):
 
     def compile_extra(self, func: Any) -> Any:
         """Takes the compiled stage from its file, or compiles it and writes the file."""
-        self._file: StageFile | None = None
-        if not is_cacheable(func):
-            return super().compile_extra(func)
+        self._file: CodeFile | None = None
         target = self.state.targetctx.codegen().magic_tuple()
-        self._file = StageFile(func, self.state.args, target)
+        try:
+            self._file = CodeFile(func, self.state.args, target, "stage")
+        except NoIdentityError as error:
+            if error.own:
+                raise
+            return super().compile_extra(func)
         saved = self._file.load()
         return self._compile(func, self._file) if saved is None else self._restore(*saved)
 
-    def _compile(self, func: Any, file: StageFile) -> Any:
+    def _compile(self, func: Any, file: CodeFile) -> Any:
         result = super().compile_extra(func)
         described, library = copy(result.fndesc), result.library
         described.typemap = described.calltypes = None  # large, and only for the lowering

@@ -15,7 +15,6 @@ from functools import cache
 from typing import Any
 
 from physics.compiler.atomics import fetch_add, wait_for_all
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.granular.body_pass import (
     DRIFT,
@@ -237,13 +236,11 @@ def make_advance(features: HeapFeatures) -> Any:
     With `resume` it continues after a return for more room. Otherwise it loads `states`, and first
     computes their forces if `Scratch.result[REFRESH]` is set. A call for no threads does nothing.
     """
-    sources = SOURCES
     body_pass, pair_forces = make_body_pass(features), make_pair_forces(features)
     rebuild = make_rebuild(features)
 
     @large_entry
     def advance(heap, constants, scratch, states, thread, threads, h, steps, resume):
-        _ = sources
         if threads == 0:  # the first call compiles, which must be over when threads wait
             return 0
         done, region = scratch.result[STEPS], 0

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 from physics.granular.body_pass import LOAD, make_body_pass
 from physics.granular.pair_forces import (
@@ -137,13 +136,11 @@ def make_report_statics(features: HeapFeatures) -> Any:
 @cache
 def make_report(features: HeapFeatures) -> Any:
     """Entry point: writes rows [contacts] of ROW at the present state; returns how many."""
-    sources = SOURCES
     body_pass = make_body_pass(features)
     report_pairs, report_statics = make_report_pairs(features), make_report_statics(features)
 
     @entry
     def report(heap, constants, scratch, states, rows):
-        _ = sources
         for slab in range(SLABS):
             body_pass(heap, constants, scratch, states, 0, slab, LOAD, 0.0, 0)
         found = report_pairs(heap, constants, scratch, rows)

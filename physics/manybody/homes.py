@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.collision.candidate_list import make_clear
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, entry, stage
 from physics.manybody.tables import MOST_COLOURS
 from physics.model.features import Features
@@ -67,13 +66,11 @@ def clear_lane(row, i, remaining_skin):
 @cache
 def make_merge(features: Features):
     """Entry point: which pairs of a new list have homes; releases the homes of the others."""
-    sources = SOURCES
     clear, timed = make_clear(features), features.finds_impacts
 
     @entry
     def merge(model, pairs, pair_kind, free, bodies, places, old, old_homes, new, homes):
         """Writes the home of each new pair, -1 for none yet. Both lists are sorted."""
-        _ = sources
         n = 0
         for m in range(new.shape[0]):
             homes[m] = -1
@@ -118,7 +115,6 @@ def make_merge(features: Features):
 @cache
 def make_settle(features: Features):
     """Entry point: gives homes to pairs that have none."""
-    sources = SOURCES
     coloured = features.impulse
 
     @stage
@@ -163,7 +159,6 @@ def make_settle(features: Features):
     @entry
     def settle(pairs, pair_kind, free, kind, pair, bodies, places, new, homes, start):
         """Continues with pair `start`; returns where room ran out, or the number of pairs."""
-        _ = sources
         for n in range(start, new.shape[0]):
             if homes[n] >= 0:
                 continue
@@ -194,12 +189,10 @@ def make_settle(features: Features):
 @cache
 def make_incidence():
     """Entry point: the homes of each body's pairs, in the order of the list of pairs."""
-    sources = SOURCES
 
     @entry
     def incidence(found, homes, bodies, places, first, incident):
         """Writes `Crowd.incident_first` and `Crowd.incident`."""
-        _ = sources
         for p in range(bodies + 1):
             first[p] = 0
         for n in range(found.shape[0]):

@@ -7,7 +7,6 @@ solved one after the other.
 from functools import cache
 
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry, stage
 from physics.manybody.blocks import (
     add_contacts,
@@ -62,7 +61,6 @@ def place_rows(crowd, pairs):
 @cache
 def make_impulse_steps(features: Features):
     """Entry point: as `make_spring_steps`, with contact rows that all threads share."""
-    sources = SOURCES
     advance_bodies, place_group = make_advance_bodies(features), make_place_group(features)
     timed, leave_impact = features.finds_impacts, make_leave_impact(features)
     choose_pairs = make_choose_pairs(features)
@@ -85,7 +83,6 @@ def make_impulse_steps(features: Features):
 
         progress[2] is 2 where there are not enough rows, and progress[3] says how many it takes.
         """
-        _ = sources
         model, state, workspace = bundle(model), bundle(state), bundle(workspace)
         crowd, pairs = bundle(crowd), bundle(pairs)
         team, batches = Team(barrier, shared, thread, threads), crowd.order.shape[0]

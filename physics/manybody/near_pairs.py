@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 from physics.manybody.tables import POSITION, ROTATION
 
@@ -123,7 +122,6 @@ class Grid(NamedTuple):
 @cache
 def make_near_pairs():
     """Entry point: lists all near pairs that can touch."""
-    sources = SOURCES
 
     @entry
     def near_pairs(
@@ -146,7 +144,6 @@ def make_near_pairs():
             found: [n] written, place of the first solid times the number of places plus that of the
                 second. The first has the smaller kind, or the smaller place.
         """
-        _ = sources
         _enter(frame, box, reach, margin, kind, plane, level, edge, grid)
         places, buckets, count = frame.shape[0], grid.bucket.shape[0] - 2, 0
         low, high, cell, entered = grid.low, grid.high, grid.cell, grid.entered

@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 
 from physics.collision.candidate_list import make_clear
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, entry, stage
 from physics.manybody.homes import FOREVER, clear_lane
 from physics.manybody.tables import MOST_COLOURS
@@ -30,12 +29,10 @@ def room_for(pairs: int, half_pairs: int, candidates: int, features: Features) -
 @cache
 def make_occupancy():
     """Entry point: lengths of lists of each pair, and how well batches are filled."""
-    sources = SOURCES
 
     @entry
     def occupancy(work, first_work, kind, pair_kind, homes, batches, lengths):
         """Writes lengths [n, 2] of the first half-pair and of all others; candidates and places."""
-        _ = sources
         filled = 0
         for n in range(homes.shape[0]):
             b, i = homes[n] // LANES, homes[n] % LANES
@@ -56,7 +53,6 @@ def make_occupancy():
 @cache
 def make_repack(features: Features):
     """Entry point: moves all pairs."""
-    sources = SOURCES
     clear = make_clear(features)
     memory_size = contact_memory(features).size
     impulse, particles = features.impulse, features.particles
@@ -141,7 +137,6 @@ def make_repack(features: Features):
             firsts: [n] place of each pair's first solid.
             seconds: [n] of its second.
         """
-        _ = sources
         at = 0
         for m in range(order.shape[0]):
             n = order[m]

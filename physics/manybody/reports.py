@@ -7,7 +7,6 @@ import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.impulse.contact_rows import make_contact_rows
 from physics.manybody.batches import (
@@ -61,7 +60,6 @@ class ReportArrays(NamedTuple):
 @cache
 def make_touching(features: Features) -> Any:
     """Entry point: the touching candidates of a world, and their number."""
-    sources = SOURCES
     impulse, compound_frames = features.impulse, make_compound_frames(features)
     half_pair = make_contact_rows(features) if impulse else make_half_pair(features, True)
 
@@ -80,7 +78,6 @@ def make_touching(features: Features) -> Any:
     @large_entry
     def touching(all_model, state, workspace, crowd, pairs, arrays):
         """Rows beyond the length of `arrays.found` are counted only."""
-        _ = sources
         all_model, state, workspace = bundle(all_model), bundle(state), bundle(workspace)
         crowd, pairs = bundle(crowd), bundle(pairs)
         count, room = 0, arrays.found.shape[0]

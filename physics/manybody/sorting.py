@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
 
 Array = np.ndarray
@@ -13,12 +12,10 @@ Array = np.ndarray
 @cache
 def make_sort_pairs():
     """Entry point: sorts pairs by their first solid, then by their second."""
-    sources = SOURCES
 
     @entry
     def sort_pairs(found, places, first, out):
         """`found`: [n] first place times `places` plus second; `first`: [places + 1] working."""
-        _ = sources
         for p in range(places + 1):
             first[p] = 0
         for n in range(found.shape[0]):
@@ -45,12 +42,10 @@ def make_sort_pairs():
 @cache
 def make_order_by():
     """Entry point: one pass of a stable sort by a column of small keys."""
-    sources = SOURCES
 
     @entry
     def order_by(keys, largest, before, after, first):
         """Writes the order `after` of the entries `before` [n] by `keys` [n], 0 to `largest`."""
-        _ = sources
         for k in range(largest + 2):
             first[k] = 0
         for n in range(keys.shape[0]):

@@ -8,7 +8,6 @@ fixed order, so the result does not depend on the number of threads.
 from functools import cache
 
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import large_entry
 from physics.manybody.batches import make_batch_forces
 from physics.manybody.blocks import (
@@ -33,7 +32,6 @@ STEP, RESUME, REFRESH = range(3)
 @cache
 def make_spring_steps(features: Features):
     """Entry point: substeps until all are done or pairs have to be searched again."""
-    sources = SOURCES
     move_group, place_group = make_move_group(features), make_place_group(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     batch_forces, end_step = make_batch_forces(features), make_end_step(features)
@@ -51,7 +49,6 @@ def make_spring_steps(features: Features):
         computes forces only; 1: pairs have to be searched; and at 6 why it refreshes. For barrier
         and shared see `Team`.
         """
-        _ = sources
         model, state, workspace = bundle(model), bundle(state), bundle(workspace)
         crowd, pairs = bundle(crowd), bundle(pairs)
         team, batches = Team(barrier, shared, thread, threads), crowd.order.shape[0]

@@ -2,7 +2,6 @@
 
 from functools import cache
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, entry
 from physics.manybody.blocks import blocks_of, make_place_group, write_tensors
 from physics.model.features import Features
@@ -13,11 +12,9 @@ from physics.step.time_layers import LARGEST
 @cache
 def make_load_bodies():
     """Entry point that loads the dynamic bodies of world w into their blocks, copies included."""
-    sources = SOURCES
 
     @entry
     def load_bodies(dynamic, w, crowd):
-        _ = sources
         for p in range(crowd.body.shape[0]):
             body = crowd.body[p]
             if body < 0:
@@ -43,12 +40,10 @@ def make_load_bodies():
 @cache
 def make_store_bodies():
     """Entry point that stores the bodies of world w, with quaternions of w >= 0."""
-    sources = SOURCES
 
     @entry
     def store_bodies(dynamic, w, crowd):
         """Returns the index plus 1 of the first body that isn't finite; 0 if all are."""
-        _ = sources
         diverged = 0
         for body in range(crowd.place.shape[0]):
             p = crowd.place[body]
@@ -76,12 +71,10 @@ def make_store_bodies():
 @cache
 def make_place_bodies(features: Features):
     """Entry point that writes the frames and tensors of bodies at rest in their blocks."""
-    sources = SOURCES
     place_group = make_place_group(features)
 
     @entry
     def place_bodies(model, workspace, crowd):
-        _ = sources
         for g in range(crowd.group.shape[0]):
             place_group(model, workspace, crowd, g)
             for m in blocks_of(crowd, g):

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 from physics.meshes.peeling import PixelGrid, fill, peel
 
@@ -91,11 +90,9 @@ def _nodes_around(corners, t, axis, origin, cell, count):
 @cache
 def _make_near() -> Any:
     """Entry point: writes squared distance and triangle of the nodes around each triangle."""
-    sources = SOURCES
 
     @entry
     def near(corners, ox, oy, oz, cell, square, nearest):
-        _ = sources
         nx, ny, nz = square.shape
         for t in range(corners.shape[0]):
             i0, i1 = _nodes_around(corners, t, 0, ox, cell, nx)
@@ -115,11 +112,9 @@ def _make_near() -> Any:
 @cache
 def _make_sweep() -> Any:
     """Entry point: passes the nearest triangles on, once along each of the eight diagonals."""
-    sources = SOURCES
 
     @entry
     def sweep(corners, ox, oy, oz, cell, square, nearest):
-        _ = sources
         nx, ny, nz = square.shape
         for sweep in range(8):
             dx = 1 if sweep & 1 else -1

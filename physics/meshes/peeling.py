@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
@@ -81,11 +80,9 @@ def _make_rasterise() -> Any:
         sign: [crossings] 1.0 where the ray enters, -1.0 where it leaves.
         writes: whether depths and signs are written.
     """
-    sources = SOURCES
 
     @entry
     def rasterise(corners, x0, y0, spacing, columns, rows, cursor, depth, sign, writes):
-        _ = sources
         for t in range(corners.shape[0]):
             a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
             ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -136,11 +133,9 @@ def _make_pair() -> Any:
         sign: [crossings]
         found: [rays], on return the number of intervals of each ray.
     """
-    sources = SOURCES
 
     @entry
     def pair(first, depth, sign, found):
-        _ = sources
         for ray in range(found.shape[0]):
             begin, end = first[ray], first[ray + 1]
             for n in range(begin + 1, end):

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry
 
 Array = np.ndarray
@@ -20,12 +19,10 @@ def worlds_last(values: Array) -> Array:
 @cache
 def make_velocity_command() -> Any:
     """Entry point: every set point starts at its drive's position and moves at a velocity."""
-    sources = SOURCES
     for_ever = math.inf
 
     @entry
     def command(dynamic, bodies, velocity):
-        _ = sources
         for w in range(velocity.shape[2]):
             for d in range(velocity.shape[0]):
                 drive = dynamic[w, bodies + d]
@@ -40,11 +37,9 @@ def make_velocity_command() -> Any:
 @cache
 def make_move_command() -> Any:
     """Entry point: every set point moves from where it is to a target in `time` s and stops."""
-    sources = SOURCES
 
     @entry
     def move(dynamic, bodies, target, time):
-        _ = sources
         for w in range(target.shape[2]):
             for d in range(target.shape[0]):
                 drive = dynamic[w, bodies + d]

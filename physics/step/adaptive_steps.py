@@ -16,7 +16,6 @@ from functools import cache
 from typing import Any
 
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.integrators.runge_kutta import make_error, make_save_rates, make_speed, make_start
 from physics.model.features import Features, cached_by_features
@@ -145,7 +144,6 @@ def make_kernel(features: Features):
 
     `h` s is the longest step, and `substeps` times it the time to advance.
     """
-    sources = SOURCES
     constants, trials = make_constants(features), make_trials(features)
     save_start, _ = make_start(features)
     save_rates = make_save_rates(features)
@@ -156,7 +154,6 @@ def make_kernel(features: Features):
     def advance_adaptively(
         all_model, state, workspace, table, chosen, first, last, h, substeps, tolerance
     ):
-        _ = sources
         state, workspace = bundle(state), bundle(workspace)
         span = substeps * h
         for g in range(first, last):

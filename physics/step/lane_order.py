@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, entry, stage
 from physics.model.features import Features
 from physics.model.state import State
@@ -205,11 +204,9 @@ def _move(first_slot, place, resident, candidates, scratch, base, n):
 @cache
 def make_sort() -> Any:
     """Entry point of `sort_worlds`."""
-    sources = SOURCES
 
     @entry
     def sort(half_pair, first_slot, place, resident, candidates, scratch, first, last):
-        _ = sources
         key, counts, moved_worlds = scratch.key, scratch.counts, 0
         for g in range(first, last, _WINDOW):
             base = g * LANES

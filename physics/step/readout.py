@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, at, entry, stage
 from physics.model.features import GENERAL, NO_ROTATION, Features, cached_by_features
 from physics.model.lanes import make_constants
@@ -107,12 +106,10 @@ def make_write_rows(features: Features):
 @cache
 def make_readout(features: Features) -> Any:
     """Entry point that writes the rows of all worlds."""
-    sources = SOURCES
     constants, write_rows = make_constants(features), make_write_rows(features)
 
     @entry
     def readout(model, state, table):
-        _ = sources
         state = bundle(state)
         for w in range(state.dynamic.shape[0]):
             g, lane = state.place[w] // LANES, state.place[w] % LANES

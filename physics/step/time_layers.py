@@ -10,7 +10,6 @@ from functools import cache
 
 from physics.collision.broadphase import make_clear_rest, make_forget
 from physics.compiler.bundles import bundle
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import LANES, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
@@ -81,7 +80,6 @@ def make_advance(features: Features):
     of room for candidates. Every world runs the same instructions in its own lane, so its result is
     bitwise the same whatever the other lanes hold and however groups are distributed over threads.
     """
-    sources = SOURCES
     constants, forget = make_constants(features), make_forget(features)
     trials = features.integrator == RK4
     substep = make_runge_kutta_substep(features) if trials else make_controlled_substep(features)
@@ -91,7 +89,6 @@ def make_advance(features: Features):
     def advance(
         all_model, state, workspace, table, chosen, first, last, h, substeps, collision_substeps
     ):
-        _ = sources
         state, workspace = bundle(state), bundle(workspace)
         for g in range(first, last):
             model = bundle(constants(all_model, g))

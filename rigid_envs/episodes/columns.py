@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.compiler.jit import entry
-from rigid_envs.tasks.goals import SOURCES, Measure
+from rigid_envs.tasks.goals import Measure
 
 Array = np.ndarray
 
@@ -40,11 +40,9 @@ class Observed(NamedTuple):
 
 @cache
 def _make_split(measure: Measure) -> Any:
-    sources = SOURCES
 
     @entry
     def split(table, low, high, goals, rows):
-        _ = sources
         count, n = rows.observation.shape
         for i in range(count):
             rows.outside[i] = False
@@ -116,11 +114,9 @@ def split(
 
 @cache
 def _make_clip_actions() -> Any:
-    sources = SOURCES
 
     @entry
     def clip_actions(rows, clipped):
-        _ = sources
         count, n = rows.shape
         for i in range(count):
             for c in range(n):

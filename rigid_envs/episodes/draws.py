@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from physics.compiler.code_cache import SOURCES
 from physics.compiler.jit import entry, stage
 
 Array = np.ndarray
@@ -34,11 +33,9 @@ def _mix(x):
 
 @cache
 def _make_draw() -> Any:
-    sources = SOURCES
 
     @entry
     def draw(seeds, episodes, streams, out):
-        _ = sources
         for i in range(out.shape[0]):
             key = _mix(seeds[i] + _GOLDEN)
             key = _mix(key + (episodes[i] + _ONE) * _GOLDEN)

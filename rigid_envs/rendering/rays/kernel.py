@@ -1,19 +1,13 @@
 """The entry of the renderer: pictures of many worlds, one after another."""
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
-from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import large_entry
 from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
 from rigid_envs.rendering.rays.shading import paint, smooth
 from rigid_envs.rendering.rays.shadows import find_shadows
 from rigid_envs.rendering.rays.visibility import find_nearest
-
-# of the engine's stages and of those of this folder
-SOURCES = ENGINE_SOURCES ^ hash_sources(Path(__file__).parent)
 
 
 @cache
@@ -41,7 +35,6 @@ def make_draw() -> Any:
         solids: [worlds, rows, columns], the solids that are seen; likewise.
         ground_solid: which solid the ground is, -1 if none.
     """
-    sources = SOURCES
 
     @large_entry
     def draw(
@@ -49,7 +42,6 @@ def make_draw() -> Any:
         tile_depth, smooths, depth, shown, hidden, ground, around, starts, entries, slabs, spans,
         rgb, depths, solids, ground_solid,
     ):  # fmt: skip
-        _ = sources
         rows, columns = depth.shape
         view, samples, sun = camera[0], len(points), sun_frame[2]
         for w in range(first, last):

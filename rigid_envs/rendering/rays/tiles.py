@@ -6,14 +6,9 @@ covers is drawn.
 
 import math
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-from physics.compiler.code_cache import SOURCES as ENGINE_SOURCES
-from physics.compiler.code_cache import hash_sources
 from physics.compiler.jit import entry, stage
-
-SOURCES = ENGINE_SOURCES ^ hash_sources(Path(__file__).parent)
 
 LINE_SPACING = 0.05  # m, between lines of the ground; every second one is emphasised
 LINE_WIDTH = 0.0012  # m
@@ -57,11 +52,9 @@ def make_draw_ground() -> Any:
         picture: [rows, columns, 3] bytes, is written.
         depth: [rows, columns] m, is written; infinite above the horizon.
     """
-    sources = SOURCES
 
     @entry
     def draw_ground(camera, target, shown, has_floor, picture, depth):
-        _ = sources
         view = camera[0]
         right, up, forward = view.axes[0], view.axes[1], view.axes[2]
         above = view.eye[2]

@@ -1,46 +1,204 @@
-"""Kernels on disk, when several processes save them at once."""
+"""Compiled code on disk: damaged files, folders that refuse, several processes, edits."""
 
-from numba.core.caching import IndexDataCacheFile
+import errno
+import logging
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
-from physics.compiler.code_cache import EntryFiles
-from physics.compiler.jit import entry
+import pytest
 
+import physics
+from physics.compiler import code_cache
 
-def saved_at_once(files, folder):
-    """Two processes read the same index before either of them writes; what each then finds."""
-    one, other = (files(str(folder), "kernel", "stamp") for _ in range(2))
-    one.flush()
-    before = one._load_index()
-    one.save("of a", "code of a")
-    other._load_index = before.copy
-    other.save("of b", "code of b")
-    return [files(str(folder), "kernel", "stamp").load(key) for key in ("of a", "of b")]
+PACKAGE = Path(physics.__file__).parent
 
-
-def test_no_kernel_takes_the_place_of_another(tmp_path):
-    found = saved_at_once(EntryFiles, tmp_path)
-    assert found[0] in ("code of a", None)  # lost from the index: it is compiled again
-    assert found[1] == "code of b"
-
-
-def test_an_index_that_lost_a_kernel_never_gives_another(tmp_path):
-    """The order in which numba mixes them up: index of b, then the code of a."""
-    for files, expected in ((IndexDataCacheFile, "code of a"), (EntryFiles, "code of b")):
-        one, other = (files(str(tmp_path), files.__name__, "stamp") for _ in range(2))
-        one.flush()
-        write = one._save_data
-        waiting = []
-        one._save_data = lambda name, data, waiting=waiting: waiting.append((name, data))
-        one.save("of a", "code of a")
-        other._load_index = dict
-        other.save("of b", "code of b")
-        write(*waiting[0])
-        assert files(str(tmp_path), files.__name__, "stamp").load("of b") == expected
+# a ball in free flight needs the fewest stages
+FALL = """
+from physics import Body, Scene, Sphere, World
+from physics.step.time_layers import make_advance
+world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2)  # both wait for one compilation
+world.advance(1.0)
+compiled = make_advance(world.features).compiled
+stats = getattr(compiled, "stats", None)
+print(sum(stats.cache_misses.values()), world.position[0, 0, 2])
+"""
 
 
-def test_entries_keep_their_kernels_in_these_files():
-    @entry
-    def twice(x):
-        return 2.0 * x
+def run(cache, program=FALL, root=PACKAGE.parent, **variables):
+    """A process of its own: the numbers that it prints, and what it writes to stderr."""
+    environment = {
+        **os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(cache),
+        "PYTHONDONTWRITEBYTECODE": "1", **variables,
+    }  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment, cwd=root, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return [float(x) for x in done.stdout.split()], done.stderr
 
-    assert isinstance(twice.compiled._cache._cache_file, EntryFiles)
+
+def files(cache):
+    """Names of what is kept, with the time at which each was written."""
+    kept = [*Path(cache).rglob("*.kernel"), *Path(cache).rglob("*.stage")]
+    return {path.name: path.stat().st_mtime_ns for path in kept}
+
+
+@pytest.fixture(scope="module")
+def used(tmp_path_factory):
+    """A copy of the package, a cache that has seen it once, and where the ball was."""
+    root = tmp_path_factory.mktemp("copy")
+    shutil.copytree(PACKAGE, root / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    (misses, height), _ = run(root / "cache", root=root)
+    assert misses == 1
+    return root, root / "cache", height
+
+
+@pytest.fixture
+def copied(used, tmp_path):
+    """The same, for a test that changes them."""
+    root, _, height = used
+    shutil.copytree(root, tmp_path / "all")
+    return tmp_path / "all", tmp_path / "all" / "cache", height
+
+
+def test_a_second_process_compiles_nothing(used):
+    root, cache, height = used
+    before = files(cache)
+    assert len(before) > 10
+    assert run(cache, root=root) == ([0.0, height], "")
+    assert files(cache) == before
+
+
+@pytest.mark.parametrize("damage", [lambda b: b"", lambda b: b[:-9], lambda b: b"foreign" * 99])
+def test_damaged_files_are_compiled_again(copied, damage):
+    root, cache, height = copied
+    for path in cache.rglob("*.*"):
+        path.write_bytes(damage(path.read_bytes()))
+    (misses, again), _ = run(cache, root=root)
+    assert (misses, again) == (1.0, height)
+    assert run(cache, root=root)[0] == [0.0, height]
+
+
+def test_a_complete_cache_may_be_read_only(copied):
+    root, cache, height = copied
+    for path in [*cache.rglob("*"), cache]:
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    try:
+        assert run(cache, root=root) == ([0.0, height], "")
+    finally:
+        for path in [cache, *cache.rglob("*")]:
+            path.chmod(0o755)
+
+
+def test_a_folder_that_cannot_be_made_is_named_once(used, tmp_path):
+    root, _, height = used
+    (tmp_path / "file").write_text("not a folder")
+    (misses, again), log = run(tmp_path / "file", root=root)
+    assert (misses, again) == (1.0, height)
+    assert log.count("can't be kept in") == 1
+    assert str(tmp_path / "file") in log
+    assert "Traceback" not in log
+
+
+def test_a_full_disk_is_reported_once(tmp_path, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    code_cache._warn_once.cache_clear()
+    monkeypatch.setattr(code_cache, "folders", lambda: [tmp_path])
+    monkeypatch.setattr(code_cache.os, "replace", full)
+    file = code_cache.CodeFile(files, "types", "target", "stage")
+    with caplog.at_level(logging.WARNING, "physics"):
+        file.save("content")
+        file.save("content")
+    assert [r.getMessage() for r in caplog.records] == [
+        f"compiled kernels can't be kept in {tmp_path} ([Errno 28] No space left on device), so "
+        "the next process compiles them again; NUMBA_CACHE_DIR names another folder"
+    ]
+    assert list(tmp_path.iterdir()) == []
+    assert file.load() is None
+
+
+def test_a_file_is_read_by_what_made_it_only(tmp_path, monkeypatch):
+    def file(types="types", target="target"):
+        return code_cache.CodeFile(files, types, target, "stage")
+
+    monkeypatch.setattr(code_cache, "folders", lambda: [tmp_path])
+    assert file().load() is None
+    file().save("content")
+    assert file().load() == "content"
+    assert file(types="others").load() is None
+    assert file(target="another processor").load() is None
+    monkeypatch.setattr(code_cache, "_MADE_BY", b"other versions")
+    assert file().load() is None
+    (path,) = tmp_path.iterdir()
+    path.rename(tmp_path / file().name)  # as if it had been made by these
+    monkeypatch.setattr(code_cache.pickle, "loads", pytest.fail)  # not even looked at
+    assert file().load() is None
+
+
+def test_processes_that_compile_the_same_kernel_at_once_agree(used, tmp_path):
+    root, _, height = used
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", FALL], cwd=root, text=True, stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(tmp_path)},
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    printed = [process.communicate(timeout=300)[0].split() for process in both]
+    assert [float(height_) for _, height_ in printed] == [height, height]
+    assert run(tmp_path, root=root)[0] == [0.0, height]
+    assert all(name.endswith((".kernel", ".stage")) for name in os.listdir(tmp_path / "rigid-envs"))
+
+
+def test_an_installed_package_keeps_its_code_with_the_user(tmp_path):
+    packages, home = tmp_path / "site-packages", tmp_path / "home"
+    shutil.copytree(PACKAGE, packages / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    run("", root=packages, XDG_CACHE_HOME=str(home), HOME=str(home))
+    assert not files(packages)
+    if sys.platform == "linux":
+        assert files(home)
+
+
+# --- edits --------------------------------------------------------------------------------------
+
+
+def edit(root, file, line, other):
+    path = root / "physics" / file
+    source = path.read_text()
+    assert line in source
+    path.write_text(source.replace(line, other))
+
+
+def test_an_edit_of_a_stage_in_another_file_is_compiled(copied):
+    root, cache, height = copied
+    before = files(cache)
+    line = "force[axis, i] = weight[axis, i]"
+    edit(root, "motion/gravity.py", line, f"{line} * 2.0")
+    (misses, twice), _ = run(cache, root=root)
+    assert misses == 1.0
+    assert twice == pytest.approx(2.0 * height, rel=1e-12)
+    new = {name.split(".")[0] for name in files(cache).keys() - before.keys()}
+    assert new == {"gravity", "advance"}
+    edit(root, "motion/gravity.py", f"{line} * 2.0", line)
+    assert run(cache, root=root)[0] == [0.0, height]
+
+
+def test_an_edit_that_no_kernel_can_reach_compiles_nothing(copied):
+    root, cache, height = copied
+    edit(root, "motion/gravity.py", "# one array a loop", "# edited: one array a loop")
+    edit(root, "tuning/tune.py", "import math\n", "import math\n\nEDITED = 1\n")
+    with (root / "physics" / "scene" / "material.py").open("a") as file:
+        file.write("EDITED = 1\n")
+    assert run(cache, root=root) == ([0.0, height], "")
+
+
+def test_an_edit_of_the_compiler_compiles_everything(copied):
+    root, cache, height = copied
+    edit(root, "compiler/fusion.py", "import re\n", "import re\n\nEDITED = 1\n")
+    assert run(cache, root=root)[0] == [1.0, height]

@@ -1,0 +1,109 @@
+"""What tells a function from others: its code, and all that it can reach.
+
+Compiled code is kept on disk, so an edit must change the name of its file. The identity of a
+function covers its own code, the values in its closure, the globals that it names, and so on
+through every function among them. So an edit compiles again what can reach it, and nothing else;
+comments don't count. What numba's own functions do is covered by its version, and what this
+package does by a hash of its files (see `code_cache`).
+"""
+
+import hashlib
+from pathlib import Path
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+_OWN = ("physics", "rigid_envs")  # packages whose modules are followed
+_COMPILER = __name__.rpartition(".")[0]
+
+
+class NoIdentityError(TypeError):
+    """A function can reach a value of which nothing tells whether it has changed.
+
+    Attributes:
+        own: whether the function is of the engine or of the environments.
+    """
+
+    own = False
+
+
+_known: dict[FunctionType, str] = {}
+
+
+def digest(function: Any) -> str:
+    """The identity of a function as 64 hexadecimal digits: the same in every process.
+
+    Raises:
+        NoIdentityError: it can reach a value whose identity isn't known, such as a list.
+    """
+    if function not in _known:
+        _known[function] = ""  # in place of one that calls itself
+        try:
+            _known[function] = hashlib.sha256(repr(_describe(function)).encode()).hexdigest()
+        finally:
+            if not _known[function]:
+                del _known[function]
+    return _known[function]
+
+
+def _describe(function: Any) -> Any:
+    name = function.__module__, function.__qualname__
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    closure = [(n, _identity(cell.cell_contents, name)) for n, cell in cells]
+    return name, _identity(function.__defaults__, name), closure, _code(function.__code__, function)
+
+
+def _code(code: CodeType, function: Any) -> Any:
+    constants = [_code(c, function) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
+    known = function.__globals__
+    name = function.__module__, function.__qualname__
+    reached: list[Any] = []
+    for n in code.co_names:  # of globals, and of attributes, which may have the same name
+        if n in known:
+            value = known[n]
+            own = isinstance(value, ModuleType) and value.__name__.partition(".")[0] in _OWN
+            if own:  # only what is read from it
+                used = [a for a in code.co_names if hasattr(value, a)]
+                reached += [(n, a, _identity(getattr(value, a), name)) for a in used]
+            else:
+                reached.append((n, _identity(value, name)))
+    return code.co_code, constants, code.co_names, code.co_varnames, reached
+
+
+def _identity(value: Any, name: tuple[str, str]) -> Any:
+    """What tells a value from others; `name` is that of the function that can reach it."""
+    if isinstance(value, FunctionType):
+        return digest(value)
+    if isinstance(value, tuple | frozenset):
+        return type(value).__name__, [_identity(part, name) for part in value]
+    if value is None or isinstance(value, bool | int | float | str | bytes | np.dtype | np.generic):
+        return type(value).__name__, repr(value)
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, ModuleType | BuiltinFunctionType | np.ufunc):
+        return value.__name__
+    if isinstance(value, type):
+        return value.__module__, value.__qualname__, getattr(value, "_fields", ())
+    if value is Any or name[0].startswith(_COMPILER) or _is_compilers(value):
+        return repr(type(value)), getattr(value, "__name__", "")
+    error = NoIdentityError(
+        f"{'.'.join(name)} is compiled, and can reach {value!r}, which is a "
+        f"{type(value).__name__}: it must be a function, a number, a string, a dtype, an array, "
+        "None or a tuple of these"
+    )
+    error.own = name[0].partition(".")[0] in _OWN
+    raise error
+
+
+def _is_compilers(value: Any) -> bool:
+    """Whether a value was made by this package, such as an atomic operation."""
+    return str(getattr(value, "__module__", "")).startswith(_COMPILER)
+
+
+def hash_files(folder: Path) -> str:
+    """A hash of all Python files in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
