@@ -45,8 +45,15 @@ class Readings:
 
     @property
     def features(self) -> Features:
-        """What is compiled in for this scene."""
-        return self._simulation.features
+        """What this scene needs. A special kernel has just this, a general one more."""
+        return self._simulation.needed
+
+    @property
+    def kernel(self) -> str:
+        """Which kernel advances the worlds: "special" or "general", see `World`."""
+        simulation = self._simulation
+        needed = simulation.needed._replace(wrench=simulation.features.wrench)
+        return "special" if simulation.features == needed else "general"
 
     @property
     def time(self) -> Array:

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics.analysis.parameter_limits import ParameterLimits
-from physics.model.state import State, copy
+from physics.model.features import Features
+from physics.model.state import State, convert, copy
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
@@ -13,11 +14,16 @@ from physics.step.simulation import Simulation
 
 
 class Snapshot(NamedTuple):
-    """The complete state of worlds, hidden contact state included, and their scene and fidelity."""
+    """The complete state of worlds, hidden contact state included, and their scene and fidelity.
+
+    Attributes:
+        features: of the kernel that advanced them: what it remembers of contacts depends on it.
+    """
 
     scene: Scene
     fidelity: Fidelity
     state: State
+    features: Features
     parameters: Parameters | None = None  # of worlds with per-world parameters
     hidden: Any = None  # of worlds of many bodies: their pairs
 
@@ -27,8 +33,8 @@ def save(simulation: Simulation) -> Snapshot:
     everyone, own = simulation.everyone, simulation.parameters
     parameters = own.pick(everyone) if simulation.features.per_world_parameters else None  # a copy
     return Snapshot(
-        simulation.scene, simulation.fidelity, copy(simulation.state), parameters,
-        simulation.saved(),
+        simulation.scene, simulation.fidelity, copy(simulation.state), simulation.features,
+        parameters, simulation.saved(),
     )  # fmt: skip
 
 
@@ -59,9 +65,12 @@ def restore(simulation: Simulation, saved: Snapshot, limits: ParameterLimits | N
                 limits.check(new, np.flatnonzero(other))
             simulation.write_parameters(other, new)
     simulation.set_wrenches(saved.state.wrench)
-    for name in saved.state._fields:
+    state = saved.state
+    if state.candidate.dtype != simulation.state.candidate.dtype:  # of another kernel
+        state = convert(state, saved.features, simulation.features)
+    for name in state._fields:
         if name != "wrench":
-            getattr(simulation.state, name)[...] = getattr(saved.state, name)
+            getattr(simulation.state, name)[...] = getattr(state, name)
     simulation.restore(saved.hidden)
     simulation.changed()
 
@@ -77,7 +86,8 @@ def _difference(simulation: Simulation, saved: Snapshot) -> str:
         return f"fidelity: {', '.join(fields)}"
     if saved.scene != simulation.scene:
         return "scene"
-    if any(a.dtype != b.dtype for a, b in zip(saved.state, simulation.state, strict=True)):
+    arrays = zip(State._fields, saved.state, simulation.state, strict=True)
+    if any(name != "candidate" and a.dtype != b.dtype for name, a, b in arrays):
         return "version: its arrays have other fields"
     if saved.state.servo.shape != simulation.state.servo.shape:
         return f"measure_work: {saved.state.servo.size > 0}"

@@ -27,6 +27,7 @@ from physics.scene.parameters import Parameters, check_ranges, check_values
 from physics.scene.scene import Scene
 from physics.scene.validation import ZERO, array, instance, integer, positive
 from physics.snapshot import Snapshot
+from physics.step.kernel_choice import requested
 from physics.step.simulation import Simulation
 from physics.step.threads import check_threads
 from physics.step.write_forces import write_motors, write_wrench
@@ -48,6 +49,12 @@ class World(Readings):
             `set_parameters`. Identical worlds are faster.
         measure_work: sum up the work of the drives' servos, see `drive_work`. For worlds side by
             side with equal steps.
+        kernel: "special": compiled for what this scene needs, which takes seconds. "general": one
+            for nearly all scenes of the same law; the same bits, at 0.85 to 0.95 of the speed.
+            Scenes with torsional resistance, tori, particles or work of servos, and joints together
+            with contacts, have special kernels only. "auto": what has been compiled before, special
+            before general; if neither has, general below 256 worlds. None: what the environment
+            variable RIGID_ENVS_KERNEL says, else "auto". `World.kernel` tells what was chosen.
 
     Raises:
         TypeError: an argument of the wrong type.
@@ -67,6 +74,7 @@ class World(Readings):
         allow_unstable: bool = False,
         per_world_parameters: bool = False,
         measure_work: bool = False,
+        kernel: str | None = None,
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene: Scene = instance("scene", scene, Scene)
@@ -76,6 +84,7 @@ class World(Readings):
         per_world_parameters = instance("per_world_parameters", per_world_parameters, bool)
         measure_work = instance("measure_work", measure_work, bool)
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
+        kernel = requested(kernel)
         arguments = scene, self.fidelity, self.count, self.threads, per_world_parameters
         crowd = is_crowd(scene, self.fidelity, per_world_parameters)
         check_solver(scene, self.fidelity, crowd)
@@ -87,14 +96,14 @@ class World(Readings):
             if not allow_unstable:
                 check_crowd(scene, self.fidelity, heap.classes())
         elif crowd:
-            many = CrowdSimulation(*arguments)
+            many = CrowdSimulation(*arguments, kernel=kernel)
             self._simulation, self._queries = many, CrowdQueries(many)
             check_integrator(scene, self.fidelity, many.base)
             if not allow_unstable:
                 check_crowd(scene, self.fidelity, many.kinds.of_solid, many.mechanisms.checked)
                 check_impacts(scene, self.fidelity, many.kinds)
         else:
-            self._simulation = Simulation(*arguments, measure_work)
+            self._simulation = Simulation(*arguments, measure_work, kernel)
             self._queries = LaneQueries(self._simulation)
             check_integrator(scene, self.fidelity, self._simulation.base)
             if not allow_unstable:
@@ -106,7 +115,8 @@ class World(Readings):
         """Names the contents of the world."""
         return (
             f"World({len(self.scene.bodies)} bodies, {len(self.scene.drives)} drives, "
-            f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count})"
+            f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count}, "
+            f"kernel={self.kernel!r})"
         )
 
     # --- time ---------------------------------------------------------------------------------

@@ -59,6 +59,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         pixels: "rgb" (3 channels), "depth", "segmentation", or a tuple of several.
         pixel_size: width and height of an observed picture, or (width, height).
         frame_stack: how many steps' pictures are stacked along the channels, the last step's last.
+        kernel: "special", "general", "auto" or None, see `physics.World`. With "auto", if no kernel
+            that can advance a registered task has been compiled, its special one is.
         **arguments: arguments of the task, such as `blocks`.
     """
 
@@ -92,6 +94,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         pixels: str | Sequence[str] = "rgb",
         pixel_size: int | tuple[int, int] = 84,
         frame_stack: int = 1,
+        kernel: str | None = None,
         **arguments: Any,
     ) -> None:
         """Builds the worlds. Call `reset` to start episodes."""
@@ -111,6 +114,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             observe_parameters,
             observe_task_guide,
             pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
+            kernel,
         )
         self._pictures = Pictures(
             self._runner,

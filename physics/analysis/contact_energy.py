@@ -19,14 +19,13 @@ resolution of 0.5. The sum is least at first contact and does not exceed that be
 mean over the drift in `spring.hunt_crossley`.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import LANES, at, large_entry
+from physics.compiler.jit import LANES, at, factory, large_entry
 from physics.impulse.contact_rows import make_contact_rows
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
@@ -39,7 +38,7 @@ from physics.step.threads import run_in_blocks
 Array = np.ndarray
 
 
-@cache
+@factory
 def _make_elastic_energy(features: Features) -> Any:
     """Entry point: writes the elastic energy [w] J of the worlds of groups first <= g < last."""
     constants, kinematics = make_constants(features), make_kinematics(features)

@@ -1,14 +1,13 @@
 """Contacts of a world: what touches what, where and how hard; computed by the step's kernels."""
 
 import functools
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import LANES, large_entry
+from physics.compiler.jit import LANES, factory, large_entry
 from physics.impulse.contact_rows import make_contact_rows
 from physics.model.contacts import Contacts
 from physics.model.features import Features
@@ -45,7 +44,7 @@ class Report(NamedTuple):
     weight: Array
 
 
-@cache
+@factory
 def _make_report(features: Features) -> Any:
     """Entry point: evaluates every candidate of a lane group at its present state."""
     constants, kinematics = make_constants(features), make_kinematics(features)

@@ -78,6 +78,10 @@ class CodeFile:
         self.digest = hashlib.sha256(_MADE_BY + key).hexdigest()[:32]
         self.name = f"{function.__name__.strip('<>')}.{self.digest}.{kind}"
 
+    def exists(self) -> bool:
+        """Whether there is a file, which may be damaged."""
+        return any((folder / self.name).exists() for folder in folders())
+
     def load(self) -> Any | None:
         """What was saved; None if nothing was, or if it is damaged."""
         for folder in folders():

@@ -15,8 +15,8 @@ import logging
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import wraps
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache, wraps
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,8 @@ from numba import njit, typeof
 from numba.core import config, event, types
 from numba.extending import overload, register_jitable
 
+from physics.compiler import helper, linking
+from physics.compiler.claims import claimed
 from physics.compiler.kernel_files import KernelFiles
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 from physics.compiler.views import View
@@ -86,7 +88,9 @@ def large_entry(function: Any) -> Any:
 
 def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return _on_records(function)
+        plain = _on_records(function)
+        plain.is_compiled, plain.prepare = lambda *_: True, lambda *_: None
+        return plain
     compiled = njit(**_ENTRY)(function)
     compiled._cache = KernelFiles(function)
     direct: list[Any] = []
@@ -94,9 +98,16 @@ def _entry(function: Any, level: int) -> Any:
 
     def compile_and_call(*arguments: Any) -> Any:
         announcement = event.install_listener("numba:compile", _Announcement(compiled, level))
-        with announcement, _without_garbage_collection():
+        types = tuple(map(typeof, arguments))
+        with ExitStack() as stack:
+            file = compiled._cache.file(types, compiled.targetctx)
+            if file and not file.exists():
+                prepare(*arguments)
+                stack.enter_context(claimed(file.digest))  # or waits until it is there
+            stack.enter_context(announcement)
+            stack.enter_context(_without_garbage_collection())
             result = compiled(*arguments)
-        direct.append(compiled.get_overload(tuple(map(typeof, arguments))))
+        direct.append(compiled.get_overload(types))
         return result
 
     @wraps(function)
@@ -110,8 +121,42 @@ def _entry(function: Any, level: int) -> Any:
                 return compile_and_call(*arguments)
         return direct[0](*arguments)
 
-    call.compiled = compiled  # type: ignore[attr-defined]
-    return call
+    def is_compiled(*arguments: Any) -> bool:
+        """Whether the entry has been compiled, now or by an earlier process."""
+        if direct:
+            return True
+        file = compiled._cache.file(tuple(map(typeof, arguments)), compiled.targetctx)
+        return file is not None and file.exists()
+
+    def prepare(*arguments: Any) -> None:
+        """Starts a second process that helps to compile the entry, if that is to be done."""
+        recipe, types = getattr(call, "recipe", None), tuple(map(typeof, arguments))
+        if recipe and not is_compiled(*arguments):
+            helper.start(recipe, types, compiled._cache.file(types, compiled.targetctx).digest)
+
+    def compile_stages(types: Any) -> None:
+        """Compiles what the entry calls, and not the entry itself."""
+        linking.stop_before_entries = True
+        with suppress(linking.Stopped), _without_garbage_collection():
+            compiled.compile(types)
+
+    entry: Any = call
+    entry.compiled, entry.is_compiled = compiled, is_compiled
+    entry.prepare, entry.compile_stages = prepare, compile_stages
+    return entry
+
+
+def factory(make: Any) -> Any:
+    """Makes each entry once, and notes how another process can make it."""
+
+    @cache
+    @wraps(make)
+    def made(*arguments: Any) -> Any:
+        entry = make(*arguments)
+        entry.recipe = make.__module__, make.__qualname__, arguments
+        return entry
+
+    return made
 
 
 @contextmanager
@@ -180,4 +225,7 @@ def _on_records(function: Any) -> Any:
             return argument.view(np.recarray)
         return argument
 
-    return lambda *arguments: function(*map(records, arguments))
+    def call(*arguments: Any) -> Any:
+        return function(*map(records, arguments))
+
+    return call

@@ -35,10 +35,11 @@ class KernelFiles(_Cache):
     def flush(self) -> None:
         """Nothing is kept in memory."""
 
-    def _file(self, signature: Any, codegen: Any) -> CodeFile | None:
+    def file(self, signature: Any, target: Any) -> CodeFile | None:
+        """The file for these types of arguments; None if nothing tells what the entry can reach."""
         types = getattr(signature, "args", signature)
         try:
-            return CodeFile(self._function, types, codegen.magic_tuple(), "kernel")
+            return CodeFile(self._function, types, target.codegen().magic_tuple(), "kernel")
         except NoIdentityError as error:
             if error.own:
                 raise
@@ -46,7 +47,7 @@ class KernelFiles(_Cache):
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """The compiled entry, or None."""
-        file = self._file(signature, target.codegen())
+        file = self.file(signature, target)
         saved: Any = file.load() if file else None
         if saved is None:
             return None
@@ -55,6 +56,6 @@ class KernelFiles(_Cache):
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Writes the compiled entry, unless it contains addresses of this process."""
-        file = self._file(signature, result.target_context.codegen())
+        file = self.file(signature, result.target_context)
         if file and not result.library.has_dynamic_globals:
             file.save(result._reduce())

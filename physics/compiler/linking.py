@@ -44,6 +44,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from physics.compiler.claims import claimed
 from physics.compiler.code_cache import CodeFile
 from physics.compiler.counting import UseCounters
 from physics.compiler.fusion import fuse_products
@@ -204,11 +205,20 @@ class _Lowering(NativeLowering):
         return _Lower
 
     def run_pass(self, state: Any) -> bool:
+        if stop_before_entries and state.pipeline.library is _Library:
+            raise Stopped
         codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
         state.func_id.unique_id = state.pipeline.symbol(state.func_id.unique_id)
         state.library = state.pipeline.library(codegen, name)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
+
+
+class Stopped(Exception):
+    """All that an entry calls has been compiled; the entry itself has not, as was asked for."""
+
+
+stop_before_entries = False  # in a process that compiles stages only
 
 
 class EntryPipeline(CompilerBase):
@@ -259,7 +269,12 @@ class StagePipeline(EntryPipeline):
                 raise
             return super().compile_extra(func)
         saved = self._file.load()
-        return self._compile(func, self._file) if saved is None else self._restore(*saved)
+        if saved is None:
+            with claimed(self._file.digest):
+                saved = self._file.load()  # another process may have compiled it
+                if saved is None:
+                    return self._compile(func, self._file)
+        return self._restore(*saved)
 
     def _compile(self, func: Any, file: CodeFile) -> Any:
         result = super().compile_extra(func)

@@ -11,11 +11,10 @@ again: it continues where it stopped.
 """
 
 import math
-from functools import cache
 from typing import Any
 
 from physics.compiler.atomics import fetch_add, wait_for_all
-from physics.compiler.jit import LANES, large_entry, stage
+from physics.compiler.jit import LANES, factory, large_entry, stage
 from physics.granular.body_pass import (
     DRIFT,
     KICK,
@@ -229,7 +228,7 @@ def make_rebuild(features):
     return rebuild
 
 
-@cache
+@factory
 def make_advance(features: HeapFeatures) -> Any:
     """Entry point: advances a heap by `steps` steps of `h` s; all threads call it together.
 

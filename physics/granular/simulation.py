@@ -85,6 +85,7 @@ class GranularSimulation(Simulation):
         self._constants = constants_of(scene, fidelity, classes, radii)
         self.heap_features = self._heap_features()
         self.base, self.features = self._model_and_features()
+        self.needed = self.features
         self.model = self.base
         self.parameters = Parameters.of(scene)
         self.everyone = np.ones(count, dtype=bool)

@@ -9,15 +9,16 @@ stays bounded. Free rotation about three different moments gains or loses energy
 stays, omega does not belong to the middle of the step.
 """
 
+from functools import cache
+
 from physics.compiler.jit import stage
-from physics.model.features import GENERAL, cached_by_features
+from physics.model.features import GENERAL
 from physics.motion.kinematics import angular_velocity_of
 
 
-@cached_by_features
-def make_euler_rotation(features, rotate_quaternion):
+@cache
+def make_euler_rotation(rotation, rotate_quaternion):
     """Formula of the exponential map: takes and returns what `make_midpoint_rotation` does."""
-    rotation = features.rotation
 
     @stage
     def euler_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, time):

@@ -10,11 +10,12 @@ SMALL_ROTATION about the slimmest axis, see `midpoint`.
 """
 
 import math
+from functools import cache
 
 from physics.compiler.jit import stage
 from physics.integrators.euler import make_euler_rotation
 from physics.integrators.midpoint import make_midpoint_rotation
-from physics.model.features import EULER, GENERAL, cached_by_features
+from physics.model.features import GENERAL
 from physics.rotation import SMALL_ROTATION, compose, rotate_quaternion_far, rotation_entries
 
 # largest number of parts of a rotation; beyond 30 rad per substep they exceed SMALL_ROTATION
@@ -65,13 +66,12 @@ def rotate_symmetric(x, y, z, w, axis, along, across, lx, ly, lz, time):
     return x, y, z, w, across * (abs(lx) + abs(ly) + abs(lz)) + abs(spin)
 
 
-@cached_by_features
-def make_far_rotation(features):
+@cache
+def make_far_rotation(rotation, euler):
     """Formula for a rotation by more than SMALL_ROTATION: see `rotate_symmetric`."""
-    euler = features.integrator == EULER
-    general = features.rotation == GENERAL and not euler
+    general = rotation == GENERAL and not euler
     make_rotation = make_euler_rotation if euler else make_midpoint_rotation
-    rotated = make_rotation(features, rotate_quaternion_far)
+    rotated = make_rotation(rotation, rotate_quaternion_far)
 
     @stage
     def far_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, time):

@@ -17,20 +17,21 @@ slimmest axis. Such a rotation is exact for bodies with two equal moments, and m
 others (see far_rotation.py; evidence: docs/decisions).
 """
 
+from functools import cache
+
 from physics.compiler.jit import stage
-from physics.model.features import GENERAL, cached_by_features
+from physics.model.features import GENERAL
 from physics.motion.kinematics import angular_velocity_of
 
 
-@cached_by_features
-def make_midpoint_rotation(features, rotate_quaternion):
+@cache
+def make_midpoint_rotation(rotation, rotate_quaternion):
     """Formula of the midpoint rule: returns the new quaternion and the omega it used.
 
-    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2). `features.rotation` is
-    NO_ROTATION, ISOTROPIC (equal moments) or GENERAL. `rotate_quaternion` is that of small angles
+    `jx`, `jy`, `jz` are the inverses of the principal moments, 1/(kg m^2). `rotation` is
+    ISOTROPIC (equal moments) or GENERAL. `rotate_quaternion` is that of small angles
     or, for any angle, `rotate_quaternion_far`.
     """
-    rotation = features.rotation
 
     @stage
     def midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, time):

@@ -97,7 +97,7 @@ def make_save_rates(features):
             copy_rows(rate, MOMENTUM, F, 3)
             if rotation != NO_ROTATION:
                 for i in range(LANES):
-                    ox, oy, oz = angular_velocity(q, j, i, L[0, i], L[1, i], L[2, i])
+                    ox, oy, oz = angular_velocity(False, q, j, i, L[0, i], L[1, i], L[2, i])
                     x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
                     rate[place(ORIENTATION, i)] = 0.5 * (w * ox + (oy * z - oz * y))
                     rate[place(ORIENTATION + 1, i)] = 0.5 * (w * oy + (oz * x - ox * z))
@@ -229,7 +229,7 @@ def make_largest(features):
                     lx = total[place(ANGULAR_MOMENTUM, i)]
                     ly = total[place(ANGULAR_MOMENTUM + 1, i)]
                     lz = total[place(ANGULAR_MOMENTUM + 2, i)]
-                    ox, oy, oz = angular_velocity(q, j, i, lx, ly, lz)
+                    ox, oy, oz = angular_velocity(False, q, j, i, lx, ly, lz)
                     spun = ox * ox + oy * oy + oz * oz
                 value = math.sqrt(max(max(moved, faster), max(turned, spun)))
                 finite = moved + faster + turned + spun < math.inf  # false for NaN

@@ -4,10 +4,8 @@ The steps of `impulse.solver`, but swept colour by colour. Those pairs that foun
 solved one after the other.
 """
 
-from functools import cache
-
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import large_entry, stage
+from physics.compiler.jit import factory, large_entry, stage
 from physics.manybody.blocks import (
     add_contacts,
     blocks_of,
@@ -58,7 +56,7 @@ def place_rows(crowd, pairs):
     return count
 
 
-@cache
+@factory
 def make_impulse_steps(features: Features):
     """Entry point: as `make_spring_steps`, with contact rows that all threads share."""
     advance_bodies, place_group = make_advance_bodies(features), make_place_group(features)

@@ -1,13 +1,12 @@
 """What touches what in a world of many bodies, computed by the step's own stages."""
 
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import LANES, large_entry, stage
+from physics.compiler.jit import LANES, factory, large_entry, stage
 from physics.impulse.contact_rows import make_contact_rows
 from physics.manybody.batches import (
     gather_pose,
@@ -57,7 +56,7 @@ class ReportArrays(NamedTuple):
     found: Array
 
 
-@cache
+@factory
 def make_touching(features: Features) -> Any:
     """Entry point: the touching candidates of a world, and their number."""
     impulse, compound_frames = features.impulse, make_compound_frames(features)

@@ -15,7 +15,7 @@ from physics.manybody.team import SHARED
 from physics.manybody.transfer import make_load_bodies, make_place_bodies, make_store_bodies
 from physics.model.build import dynamic_rows, per_world_dtype
 from physics.model.coefficients import dynamic_columns
-from physics.model.features import Features
+from physics.model.features import Features, general
 from physics.model.fields import field_rows
 from physics.model.impulse_rows import CONTACT_ROW
 from physics.model.joints import joint_rows
@@ -87,6 +87,18 @@ class CrowdSimulation(Simulation):
             joint_row=joint_rows(scene, len(dynamic) + len(poses)),
         )
         return base, self.kinds.features
+
+    def _choose(self, kernel: str) -> Features:
+        """What is compiled in: what is needed, unless a general kernel is asked for."""
+        more = general(self.needed) if kernel == "general" else None
+        if more is None:
+            return self.needed
+        features = more._replace(rotation=self.needed.rotation)
+        self.kinds = self.kinds._replace(features=features)
+        return features
+
+    def _prepare(self) -> None:
+        """Left to the first call, which has the arrays."""
 
     def _find_kernels(self) -> None:
         impulse = self.kinds.features.impulse
@@ -189,7 +201,7 @@ class CrowdSimulation(Simulation):
 
     def _run_substeps(self, w: int, h: float, substeps: int) -> bool:
         status, lists, crowd = self.state.world[w : w + 1], self._lists[w], self._worlds[w][0]
-        if self.features.wrench:
+        if self.state.wrench.size > 0:
             wrench = np.zeros((crowd.motion.size, 6))
             wrench[crowd.place] = self.state.wrench[w]
             crowd = crowd._replace(wrench=wrench)
@@ -282,7 +294,7 @@ class CrowdSimulation(Simulation):
 
     def _compile_wrenches(self) -> None:
         """Adds the state of forces from the user, unless it is there; kernels need nothing new."""
-        if not self.features.wrench:
+        if self.state.wrench.size == 0:
             self.features = self.features._replace(wrench=True)
             rows = np.zeros((self.count, len(self.base.dynamic), 6))
             self.state = self.state._replace(wrench=rows)

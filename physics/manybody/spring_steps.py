@@ -5,10 +5,8 @@ between the two. Every batch writes its own wrenches, and every body adds up tho
 fixed order, so the result does not depend on the number of threads.
 """
 
-from functools import cache
-
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import large_entry
+from physics.compiler.jit import factory, large_entry
 from physics.manybody.batches import make_batch_forces
 from physics.manybody.blocks import (
     add_contacts,
@@ -29,7 +27,7 @@ from physics.spring.mass_splitting import splits_mass
 STEP, RESUME, REFRESH = range(3)
 
 
-@cache
+@factory
 def make_spring_steps(features: Features):
     """Entry point: substeps until all are done or pairs have to be searched again."""
     move_group, place_group = make_move_group(features), make_place_group(features)

@@ -96,7 +96,9 @@ def build(
     tables = (dynamic, half_pairs, parts, hidden, static, samples)
     fields, points = field_rows(scene)
     model = Model(*tables, fields, joints, grids, nodes, points)
-    return model, _features(scene, fidelity, model, per_world_parameters)
+    features = _features(scene, fidelity, model, per_world_parameters)
+    dynamic["rotation"] = features.rotation
+    return model, features
 
 
 def expand_per_world(model: Model, count: int) -> Model:

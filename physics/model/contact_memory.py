@@ -9,6 +9,11 @@ from typing import NamedTuple
 
 from physics.model.features import Features, cached_by_features
 
+ROWS = {
+    "normal_force": 1, "impact_speed": 1, "approach": 1, "shear": 3, "tangential_force": 3,
+    "twist": 3, "face": 1,
+}  # fmt: skip
+
 
 class ContactMemory(NamedTuple):
     """First row of each quantity, -1 where the scene has none; and the number of rows.
@@ -40,18 +45,18 @@ class ContactMemory(NamedTuple):
 def contact_memory(features: Features) -> ContactMemory:
     """The memory that contacts of a scene with these features have."""
     coulomb = features.friction and not features.viscous
-    rows = {
-        "normal_force": 1,
-        "impact_speed": 0 if features.impulse else 1,
-        "approach": 0 if features.impulse else 1,
-        "shear": 3 if coulomb else 0,
-        "tangential_force": 3 if coulomb and features.impulse else 0,
-        "twist": 3 if features.resistance else 0,
-        "face": 1 if features.box or features.cylinder else 0,
+    present = {
+        "normal_force": True,
+        "impact_speed": not features.impulse,
+        "approach": not features.impulse,
+        "shear": coulomb,
+        "tangential_force": coulomb and features.impulse,
+        "twist": features.resistance,
+        "face": features.box or features.cylinder,
     }
     size, first = 0, {}
-    for name, count in rows.items():
-        if count:
+    for name, rows in ROWS.items():
+        if present[name]:
             first[name] = size
-            size += count
+            size += rows
     return ContactMemory(size, **first)

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, NamedTuple, TypeVar
 
-# rotation of bodies: none; with equal principal moments of inertia; general
-NO_ROTATION, ISOTROPIC, GENERAL = range(3)
+# rotation of bodies: none; with equal principal moments of inertia; general; or by the model's
+# table, whose column has one of the first three
+NO_ROTATION, ISOTROPIC, GENERAL, BY_TABLE = range(4)
 # values of `Fidelity.integrator`
 MIDPOINT, EULER, RK4, ADAPTIVE = range(4)
 # time control, in the order of `fidelity.TIME_CONTROLS`
@@ -29,7 +30,7 @@ class Features(NamedTuple):
         slope: weight can press along a ground or static.
         lever: a ball can touch a body beside its centre, which makes the effective mass smaller.
         resistance: at least one pair has rolling or spinning resistance.
-        rotation: NO_ROTATION, ISOTROPIC or GENERAL.
+        rotation: NO_ROTATION, ISOTROPIC, GENERAL or BY_TABLE.
         plane, sphere, box, capsule, particles, cylinder, torus: kinds of surface that samples are
             tested against.
         grid: likewise, the distance grid of a mesh.
@@ -39,7 +40,7 @@ class Features(NamedTuple):
         gripper: at least two of the drives are the fingers of a gripper.
         fields: the scene has fields: springs to points, attractors, drag.
         surface_drag: at least one of them is a surface drag.
-        wrench: `World.apply_wrench` has been used.
+        wrench: `World.apply_wrench` has been used, or may be.
         joints: the scene has joints.
         compound: at least one surface is a part of a compound and has its own frame.
         per_world_parameters: masses, materials and sizes can differ between worlds.
@@ -83,6 +84,42 @@ class Features(NamedTuple):
     def finds_impacts(self) -> bool:
         """Whether steps are cut at the times of impacts."""
         return self.time_control in (BISECTION, ADVANCEMENT, SWEPT)
+
+
+# What general kernels can do, by what a scene has. Each of these leaves every bit of the result of
+# a scene that doesn't need it. Left out is what would cost others more than a tenth of their speed,
+# or would double the time to compile: docs/trade.md has the figures
+_MOTION = ("drives", "gripper", "fields", "wrench")
+_WITH_CONTACTS = (
+    "friction", "lever", "plane", "sphere", "box", "capsule", "cylinder", "grid", "axial", "mesh",
+    "compound",
+)  # fmt: skip
+_WITHOUT_CONTACTS = ("surface_drag", "joints")
+_KINDS = ("plane", "sphere", "box", "capsule", "particles", "cylinder", "torus", "grid")
+
+
+def general(needed: Features) -> Features | None:
+    """The features of the general kernel for scenes that need these; None if there is none.
+
+    Law, integrator, solver, damping, kind of friction, time control and per-world parameters are
+    those needed, because they change results or the layout of the state; so is the rotation of
+    Runge-Kutta steps. So there is one general kernel for each combination of them, and one for
+    scenes in which nothing can touch.
+    """
+    touches = any(getattr(needed, name) for name in _KINDS)
+    names = (*_MOTION, *(_WITH_CONTACTS if touches else _WITHOUT_CONTACTS))
+    others = {*_KINDS, *_WITHOUT_CONTACTS, "resistance", "measures_work"} - {*names}
+    if any(getattr(needed, name) for name in others):
+        return None
+    smooth = needed.impulse or needed.dashpot or needed.viscous
+    # Runge-Kutta steps have one rule for all bodies; and time control looks ahead
+    still = needed.rotation == NO_ROTATION
+    keeps = needed.integrator in (RK4, ADAPTIVE) or (still and needed.time_control != FIXED)
+    return needed._replace(
+        **dict.fromkeys(names, True),
+        slope=touches and not smooth,
+        rotation=needed.rotation if keeps else BY_TABLE,
+    )
 
 
 Made = TypeVar("Made")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.compiler.jit import LANES, aligned_zeros, columns
-from physics.model.contact_memory import contact_memory
+from physics.model.contact_memory import ROWS, contact_memory
 from physics.model.features import ADAPTIVE, Features, cached_by_features
 from physics.model.free_memory import check_memory
 from physics.model.tables import Model
@@ -118,8 +118,8 @@ class State(NamedTuple):
         world: [w] of STATUS.
         sample_id: [groups, slots, LANES] of each candidate; LANES worlds make a lane group.
         candidate: [groups, slots] of candidate_dtype.
-        wrench: [w, m, 6] force in N and torque in N m from the user, world frame; [0, m, 6] without
-            `features.wrench`.
+        wrench: [w, m, 6] force in N and torque in N m from the user, world frame; [0, m, 6] until
+            there are any.
         motor: [w, motors, 2] of each motor, in the order of the joints: rad/s or m/s; and rad or m,
             the set point of a servo, NaN: none.
         pace: [w] of PACE; [0] unless the integrator is adaptive.
@@ -167,7 +167,7 @@ def allocate(model: Model, features: Features, count: int) -> State:
         world=np.zeros(count, dtype=STATUS),
         sample_id=np.zeros((groups, slots, LANES), dtype=np.int32),
         candidate=aligned_zeros((groups, slots), candidates),
-        wrench=np.zeros((count if features.wrench else 0, len(model.dynamic), 6)),
+        wrench=np.zeros((0, len(model.dynamic), 6)),
         motor=np.zeros((count, int(model.joint_row["motor"].max(initial=-1)) + 1, 2)),
         pace=np.zeros(count if features.integrator == ADAPTIVE else 0, PACE),
         place=np.arange(count),
@@ -181,6 +181,26 @@ def allocate(model: Model, features: Features, count: int) -> State:
     state.touch[:, FIRST_TOUCH] = np.nan
     state.world["needs_refresh"] = STARTS_ANEW
     return state
+
+
+def convert(state: State, before: Features, after: Features) -> State:
+    """The state of worlds whose kernel had some features for a kernel with others.
+
+    What the new kernel remembers of contacts beyond the old one is zero, as for a scene that
+    doesn't need it.
+    """
+    old, new = contact_memory(before), contact_memory(after)
+    candidates = aligned_zeros(state.candidate.shape, candidate_dtype(after))
+    known = set(state.candidate.dtype.names or ())
+    for name in candidates.dtype.names or ():
+        if name in known and name != "memory":
+            candidates[name] = state.candidate[name]
+    for name in old._fields[1:]:
+        source, target = getattr(old, name), getattr(new, name)
+        if source >= 0 and target >= 0:
+            rows = slice(source, source + ROWS[name]), slice(target, target + ROWS[name])
+            candidates["memory"][:, :, rows[1]] = state.candidate["memory"][:, :, rows[0]]
+    return state._replace(candidate=candidates)
 
 
 def copy(state: State) -> State:

@@ -22,6 +22,7 @@ Array = np.ndarray
 DYNAMIC = np.dtype(
     [
         ("is_body", "i8"),  # 1 for a body, 0 for a drive
+        ("rotation", "i8"),  # that of the scene, see `features`: of kernels for any rotation
         ("core_reach", "f8"),  # m, from the centre to the farthest point that rotation moves
         ("inverse_mass", "f8"),  # 1/kg
         ("inertia", "f8", (3,)),  # kg m^2, principal moments; infinite for drives

@@ -17,7 +17,7 @@ A surface drag is summed over points of the body's surface, in the body frame.
 import math
 
 from physics.compiler.jit import LANES, at, stage
-from physics.model.features import cached_by_features
+from physics.model.features import GENERAL, cached_by_features
 from physics.model.tables import ATTRACTOR, DRAG, POINT_SPRING, SURFACE_DRAG
 from physics.motion.kinematics import make_angular_velocity
 from physics.motion.vectors import cross, rotated, rotated_back
@@ -43,7 +43,7 @@ def make_present_velocities(features):
                     solid.present_angular_velocity,
                     solid.orientation,
                 )
-                j = constants.inverse_inertia
+                j, general = constants.inverse_inertia, constants.rotation == GENERAL
                 for i in range(LANES):
                     inverse_mass = at(constants.inverse_mass, i)
                     v[0, i] = inverse_mass * (P[0, i] + half * F[0, i])
@@ -52,7 +52,7 @@ def make_present_velocities(features):
                     lx = L[0, i] + half * T[0, i]
                     ly = L[1, i] + half * T[1, i]
                     lz = L[2, i] + half * T[2, i]
-                    ox, oy, oz = angular_velocity(q, j, i, lx, ly, lz)
+                    ox, oy, oz = angular_velocity(general, q, j, i, lx, ly, lz)
                     omega[0, i] = ox
                     omega[1, i] = oy
                     omega[2, i] = oz
@@ -266,7 +266,7 @@ def make_wrenches(features):
 
     @stage
     def wrenches(state, workspace):
-        if wrench:
+        if wrench and state.wrench.shape[0] > 0:
             for i in range(LANES):
                 w = workspace.lane[0].world[i]
                 if w >= 0:

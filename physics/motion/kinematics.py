@@ -1,7 +1,9 @@
 """Frames of all solids: rotation matrix, velocity and angular velocity from the state."""
 
+from functools import cache
+
 from physics.compiler.jit import LANES, at, stage
-from physics.model.features import GENERAL, NO_ROTATION, cached_by_features
+from physics.model.features import BY_TABLE, GENERAL, ISOTROPIC, NO_ROTATION, cached_by_features
 from physics.rotation import rotation_entries
 
 
@@ -70,15 +72,23 @@ def angular_velocity_of(x, y, z, w, jx, jy, jz, lx, ly, lz):
 
 @cached_by_features
 def make_angular_velocity(features):
-    """Formula for omega in lane i of orientations q, 1/moments j and angular momenta l."""
-    rotation = features.rotation
+    """Formula for omega in lane i of orientations q, 1/moments j and angular momenta l.
+
+    `general`: whether the rotation by the table is GENERAL; otherwise not read.
+    """
+    return _angular_velocity_by(features.rotation)
+
+
+@cache
+def _angular_velocity_by(rotation):
+    by_table = rotation == BY_TABLE
 
     @stage
-    def angular_velocity(q, j, i, lx, ly, lz):
+    def angular_velocity(general, q, j, i, lx, ly, lz):
         jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
         if rotation == NO_ROTATION:
             ox, oy, oz = 0.0, 0.0, 0.0
-        elif rotation == GENERAL:
+        elif rotation == GENERAL or (by_table and general):
             ox, oy, oz = angular_velocity_of(
                 q[0, i], q[1, i], q[2, i], q[3, i], jx, jy, jz, lx, ly, lz
             )
@@ -89,28 +99,47 @@ def make_angular_velocity(features):
     return angular_velocity
 
 
+@cache
+def _make_write_velocities(rotation):
+    """Stage that writes velocity and angular velocity of a dynamic body."""
+    angular_velocity = _angular_velocity_by(rotation)
+
+    @stage
+    def write_velocities(solid, constants):
+        q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
+        v, omega = solid.velocity, solid.angular_velocity
+        inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
+        # drives have an inverse inertia of zero. Without omega the loop would be so short that LLVM
+        # unrolls it instead of vectorising it
+        for i in range(LANES):
+            v[0, i] = at(inverse_mass, i) * P[0, i]
+            v[1, i] = at(inverse_mass, i) * P[1, i]
+            v[2, i] = at(inverse_mass, i) * P[2, i]
+            ox, oy, oz = angular_velocity(False, q, j, i, L[0, i], L[1, i], L[2, i])
+            omega[0, i] = ox
+            omega[1, i] = oy
+            omega[2, i] = oz
+
+    return write_velocities
+
+
 @cached_by_features
 def make_kinematics(features):
     """Stage that updates the frames of the dynamic bodies from their state."""
-    angular_velocity = make_angular_velocity(features)
+    rotation = features.rotation
+    by_table = rotation == BY_TABLE
+    write = _make_write_velocities(ISOTROPIC if by_table else rotation)
+    write_general = _make_write_velocities(GENERAL)
 
     @stage
     def kinematics(model, workspace):
         for m in range(model.dynamic.shape[0]):
             solid, constants = workspace.solid[m], model.dynamic[m]
-            q, P, L = solid.orientation, solid.momentum, solid.angular_momentum
-            v, omega = solid.velocity, solid.angular_velocity
-            inverse_mass, j = constants.inverse_mass, constants.inverse_inertia
-            # drives have an inverse inertia of zero. Without omega the loop would be so short that
-            # LLVM unrolls it instead of vectorising it
-            for i in range(LANES):
-                v[0, i] = at(inverse_mass, i) * P[0, i]
-                v[1, i] = at(inverse_mass, i) * P[1, i]
-                v[2, i] = at(inverse_mass, i) * P[2, i]
-                ox, oy, oz = angular_velocity(q, j, i, L[0, i], L[1, i], L[2, i])
-                omega[0, i] = ox
-                omega[1, i] = oy
-                omega[2, i] = oz
+            # the loop over lanes has no branch
+            if by_table and constants.rotation == GENERAL:
+                write_general(solid, constants)
+            else:
+                write(solid, constants)
             if constants.is_body:  # the others: `write_drive_frames`
                 for i in range(LANES):
                     write_rotation(solid, i)

@@ -11,12 +11,10 @@ rejected. What is left of a frame is divided into equal steps, so none is tiny.
 """
 
 import math
-from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import LANES, large_entry, stage
+from physics.compiler.jit import LANES, factory, large_entry, stage
 from physics.integrators.runge_kutta import make_error, make_save_rates, make_speed, make_start
 from physics.model.features import Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
@@ -138,7 +136,7 @@ def make_write_back(features: Features):
     return write_back
 
 
-@cache
+@factory
 def make_kernel(features: Features):
     """Entry point: as `time_layers.make_advance`, with a tolerance in 1/s as the last argument.
 
@@ -186,11 +184,14 @@ def make_kernel(features: Features):
     return advance_adaptively
 
 
-def make_adaptive_advance(features: Features, tolerance: float) -> Callable[..., Any]:
+def make_adaptive_advance(features: Features, tolerance: float) -> Any:
     """The kernel at a tolerance in 1/s, called like that of `time_layers.make_advance`."""
     kernel = make_kernel(features)
 
-    def advance(*arguments: Any) -> Any:
-        return kernel(*arguments[:-1], tolerance)  # it has no collision steps
+    def with_tolerance(function: Any) -> Any:
+        return lambda *arguments: function(*arguments[:-1], tolerance)  # it has no collision steps
 
+    advance = with_tolerance(kernel)
+    advance.is_compiled = with_tolerance(kernel.is_compiled)
+    advance.prepare = with_tolerance(kernel.prepare)
     return advance

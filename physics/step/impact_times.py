@@ -24,7 +24,7 @@ from physics.collision.distances import core_distance
 from physics.collision.separations import separation_bound
 from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import at, stage
-from physics.model.features import BISECTION, GENERAL, NO_ROTATION, cached_by_features
+from physics.model.features import BISECTION, BY_TABLE, GENERAL, NO_ROTATION, cached_by_features
 from physics.model.workspace import BRACKET
 from physics.motion.vectors import cross, rotated_back
 from physics.scene.shapes import PARTICLES, PLANE, SPHERE
@@ -47,6 +47,7 @@ def make_rotation_bounds(features):
     radian, its angular speed grows by less than half.
     """
     rotation = features.rotation
+    general = rotation in (GENERAL, BY_TABLE)
 
     @stage
     def rotation_bounds(model, workspace, m, i, left):
@@ -63,7 +64,7 @@ def make_rotation_bounds(features):
         turning = math.sqrt(T[0, i] * T[0, i] + T[1, i] * T[1, i] + T[2, i] * T[2, i])
         driven = turning * max(jx, jy, jz)
         fastest = omega + driven * left
-        if rotation == GENERAL and not jx == jy == jz:
+        if general and not jx == jy == jz:
             left = min(left, 0.5 / max(fastest, 1e-300))
             fastest *= 1.5
             driven += fastest * fastest / math.sqrt(3)

@@ -7,10 +7,12 @@ middle: exact for the centres, the midpoint rule for rotations. The whole subste
 drift of `integrators/drift.py`.
 """
 
+from functools import cache
+
 from physics.compiler.jit import at, stage
 from physics.integrators.far_rotation import make_far_rotation, small_rotation_limit
 from physics.integrators.midpoint import make_midpoint_rotation
-from physics.model.features import NO_ROTATION, cached_by_features
+from physics.model.features import BY_TABLE, GENERAL, ISOTROPIC, NO_ROTATION, cached_by_features
 from physics.motion.kinematics import make_angular_velocity, write_rotation
 from physics.motion.vectors import rotated
 from physics.rotation import rotate_quaternion
@@ -21,8 +23,9 @@ from physics.scene.shapes import PLANE
 def make_move(features):
     """Stage that moves lane i by `span` s from `time` s after the beginning of the substep `h`."""
     rotation = features.rotation
-    midpoint_rotation = make_midpoint_rotation(features, rotate_quaternion)
-    far_rotation = make_far_rotation(features)
+    by_table = rotation == BY_TABLE
+    rotate = _make_rotate(ISOTROPIC if by_table else rotation)
+    rotate_general = _make_rotate(GENERAL)
 
     @stage
     def move(model, workspace, i, time, span, h):
@@ -37,29 +40,45 @@ def make_move(features):
                 solid.displacement[c, i] += along
             if rotation == NO_ROTATION or not constants.is_body:
                 continue
-            L, T, q = solid.angular_momentum, solid.torque, solid.orientation
-            lx, ly, lz = (
-                L[0, i] + offset * T[0, i],
-                L[1, i] + offset * T[1, i],
-                L[2, i] + offset * T[2, i],
-            )
-            j = constants.inverse_inertia
-            jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
-            square = lx * lx + ly * ly + lz * lz
-            limit = small_rotation_limit(jx, jy, jz, span)
-            x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
-            if square <= limit:
-                x, y, z, w, ox, oy, oz = midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
-                fastest = abs(ox) + abs(oy) + abs(oz)
+            if by_table and constants.rotation == GENERAL:
+                rotate_general(solid, constants, i, offset, span)
             else:
-                x, y, z, w, fastest = far_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
-            q[0, i] = x
-            q[1, i] = y
-            q[2, i] = z
-            q[3, i] = w
-            solid.rotation_bound[i] += span * fastest * at(constants.core_reach, i)
+                rotate(solid, constants, i, offset, span)
 
     return move
+
+
+@cache
+def _make_rotate(rotation):
+    """Stage that rotates a body in lane i by the angular momentum at `offset` s for `span` s."""
+    midpoint_rotation = make_midpoint_rotation(rotation, rotate_quaternion)
+    far_rotation = make_far_rotation(rotation, False)
+
+    @stage
+    def rotate(solid, constants, i, offset, span):
+        L, T, q = solid.angular_momentum, solid.torque, solid.orientation
+        lx, ly, lz = (
+            L[0, i] + offset * T[0, i],
+            L[1, i] + offset * T[1, i],
+            L[2, i] + offset * T[2, i],
+        )
+        j = constants.inverse_inertia
+        jx, jy, jz = at(j[0], i), at(j[1], i), at(j[2], i)
+        square = lx * lx + ly * ly + lz * lz
+        limit = small_rotation_limit(jx, jy, jz, span)
+        x, y, z, w = q[0, i], q[1, i], q[2, i], q[3, i]
+        if square <= limit:
+            x, y, z, w, ox, oy, oz = midpoint_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
+            fastest = abs(ox) + abs(oy) + abs(oz)
+        else:
+            x, y, z, w, fastest = far_rotation(x, y, z, w, jx, jy, jz, lx, ly, lz, span)
+        q[0, i] = x
+        q[1, i] = y
+        q[2, i] = z
+        q[3, i] = w
+        solid.rotation_bound[i] += span * fastest * at(constants.core_reach, i)
+
+    return rotate
 
 
 @cached_by_features
@@ -83,6 +102,7 @@ def make_place_dynamic(features):
                 write_rotation(solid, i)
                 L, T = solid.angular_momentum, solid.torque
                 ox, oy, oz = angular_velocity(
+                    constants.rotation == GENERAL,
                     solid.orientation,
                     constants.inverse_inertia,
                     i,
@@ -186,8 +206,8 @@ def make_relative_speed(features):
         if rotation == NO_ROTATION or m >= model.dynamic.shape[0] or not model.dynamic[m].is_body:
             return 0.0
         q, L = workspace.solid[m].orientation, workspace.solid[m].angular_momentum
-        inverse = model.dynamic[m].inverse_inertia
-        x, y, z = angular_velocity(q, inverse, i, L[0, i], L[1, i], L[2, i])
+        inverse, general = model.dynamic[m].inverse_inertia, model.dynamic[m].rotation == GENERAL
+        x, y, z = angular_velocity(general, q, inverse, i, L[0, i], L[1, i], L[2, i])
         return (abs(x) + abs(y) + abs(z)) * at(model.dynamic[m].core_reach, i)
 
     @stage

@@ -7,7 +7,7 @@ import numpy as np
 
 from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, at, entry, stage
-from physics.model.features import GENERAL, NO_ROTATION, Features, cached_by_features
+from physics.model.features import BY_TABLE, GENERAL, NO_ROTATION, Features, cached_by_features
 from physics.model.lanes import make_constants
 from physics.motion.kinematics import angular_velocity_of
 
@@ -64,6 +64,7 @@ class Readout(NamedTuple):
 def make_write_rows(features: Features):
     """Stage that writes the rows of one world."""
     rotation = features.rotation
+    by_table = rotation == BY_TABLE
 
     @stage
     def write_rows(model, state, w, lane, table):
@@ -89,7 +90,7 @@ def make_write_rows(features: Features):
             if rotation != NO_ROTATION and constants.is_body:
                 L, j = m.angular_momentum, constants.inverse_inertia
                 jx, jy, jz = at(j[0], lane), at(j[1], lane), at(j[2], lane)
-                if rotation == GENERAL:
+                if rotation == GENERAL or (by_table and constants.rotation == GENERAL):
                     ox, oy, oz = angular_velocity_of(x, y, z, s, jx, jy, jz, L[0], L[1], L[2])
                 else:
                     ox, oy, oz = jx * L[0], jx * L[1], jx * L[2]

@@ -27,11 +27,11 @@ from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.scene.solids import Body
-from physics.step.adaptive_steps import make_adaptive_advance
+from physics.step.kernel_choice import choose, find_advance, prepare
 from physics.step.lane_order import PAUSE, Scratch, can_sort, make_sort, sort_worlds
 from physics.step.readout import WIDTH, Readout, make_readout
 from physics.step.threads import run_in_blocks
-from physics.step.time_layers import make_advance, substep_count
+from physics.step.time_layers import substep_count
 
 Array = np.ndarray
 
@@ -46,12 +46,14 @@ class Simulation:
         threads: number of threads.
         per_world_parameters: whether parameters may differ between worlds.
         measures_work: whether the work of servos is summed up.
+        kernel: see `kernel_choice`.
 
     Attributes:
         base: the model of the scene itself.
         model: the model that the kernels read, with rows for each lane group if
             `per_world_parameters`.
-        features: what is compiled in.
+        needed: the features that the scene needs.
+        features: what is compiled in, which may be more.
         parameters: [count, bodies] of the bodies; of identical worlds [1, bodies].
         state: what changes.
     """
@@ -64,16 +66,18 @@ class Simulation:
         threads: int,
         per_world_parameters: bool,
         measures_work: bool = False,
+        kernel: str = "special",
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene, self.fidelity, self.count, self.threads = scene, fidelity, count, threads
         self.bodies = len(scene.bodies)
         self.base: Model
-        self.features: Features
+        self.needed: Features
         self._per_world = per_world_parameters
-        self.base, self.features = self._build()
+        self.base, self.needed = self._build()
         if measures_work:
-            self.features = self.features._replace(measures_work=True)
+            self.needed = self.needed._replace(measures_work=True)
+        self.features = self._choose(kernel)
         self.model = expand_per_world(self.base, count) if per_world_parameters else self.base
         self._layout = Layout.of(scene, fidelity) if per_world_parameters else None
         self.parameters = Parameters.of(scene, count if per_world_parameters else 1)
@@ -86,7 +90,7 @@ class Simulation:
         self._calls_to_sort = 0
         self._fresh = False
         self._table = columns((len(self.base.dynamic), WIDTH), count, float)
-        self._table_valid = self._lent = False
+        self._table_valid = self._lent = self._prepared = False
         self._span, self._substeps = math.nan, 0
         self.last_substep, self._last_worlds = math.nan, self.everyone  # of the last call; s
         self._initial = self._initial_rows()
@@ -95,6 +99,16 @@ class Simulation:
     def _build(self) -> tuple[Model, Features]:
         """The model of the scene itself, and what is compiled in."""
         return build(self.scene, self.fidelity, self._per_world)
+
+    def _choose(self, kernel: str) -> Features:
+        """What is compiled in."""
+        return choose(kernel, self.needed, self.base, self.fidelity, self.count)
+
+    def _prepare(self) -> None:
+        """A second process starts to compile the kernel, if that has to be done."""
+        if not self._prepared:
+            prepare(self.features, self.base, self.fidelity)
+            self._prepared = True
 
     def _allocate(self) -> None:
         """Arrays beside the state: none."""
@@ -132,7 +146,7 @@ class Simulation:
             dynamic[worlds, : self.bodies] = self._moving(rows, inverse_mass, inertia)
         self.state.world["time"][worlds] = 0.0
         self.state.motor[worlds] = motor_commands(self.scene)
-        if self.features.wrench:
+        if self.state.wrench.size > 0:
             self.state.wrench[worlds] = 0.0
         self.forget(worlds)
 
@@ -189,17 +203,19 @@ class Simulation:
 
     def _compile_wrenches(self) -> None:
         """Adds the stage and the state of forces from the user, unless they are there."""
+        if self.state.wrench.size > 0:
+            return
+        rows = np.zeros((self.count, len(self.base.dynamic), 6))
+        self.state = self.state._replace(wrench=rows)
         if not self.features.wrench:
             self.features = self.features._replace(wrench=True)
-            rows = np.zeros((self.count, len(self.base.dynamic), 6))
-            self.state = self.state._replace(wrench=rows)
             self._find_kernels()
 
     def set_wrenches(self, wrench: Array) -> None:
         """Sets the forces from the user to those of a state, which has none if it is empty."""
         if wrench.size > 0:
             self._compile_wrenches()
-        if self.features.wrench:
+        if self.state.wrench.size > 0:
             self.state.wrench[...] = wrench if wrench.size > 0 else 0.0
 
     def _end_wrenches(self, worlds: Array) -> None:
@@ -294,6 +310,7 @@ class Simulation:
     def readout(self) -> Readout:
         """All poses and velocities now, drives after the bodies: read-only."""
         if not self._table_valid:
+            self._prepare()  # before the first step, if this is the first call of a kernel
             self._table = np.empty_like(self._table) if self._lent else self._table
             self._readout(self.model, self.state, self._table)
             self._table_valid = True
@@ -317,7 +334,7 @@ class Simulation:
         self, inverse_inertia: Array, orientation: Array, momentum: Array
     ) -> Array:
         """Angular velocity [..., 3] of an angular momentum."""
-        if self.features.rotation == ISOTROPIC:  # the same about every axis, in any frame
+        if self.needed.rotation == ISOTROPIC:  # the same about every axis, in any frame
             return np.asarray(inverse_inertia * momentum)
         rotated = inverse_inertia * rotate_back(orientation, momentum)
         return np.asarray(rotate(orientation, rotated))
@@ -360,12 +377,7 @@ class Simulation:
         self.forget(worlds)
 
     def _find_kernels(self) -> None:
-        tolerance = self.fidelity.tolerance
-        self._advance = (
-            make_advance(self.features)
-            if tolerance is None
-            else make_adaptive_advance(self.features, tolerance)
-        )
+        self._advance = find_advance(self.features, self.fidelity)
         self._readout = make_readout(self.features)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -6,11 +6,10 @@ collision step.
 """
 
 import math
-from functools import cache
 
 from physics.collision.broadphase import make_clear_rest, make_forget
 from physics.compiler.bundles import bundle
-from physics.compiler.jit import LANES, large_entry, stage
+from physics.compiler.jit import LANES, factory, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
 from physics.motion.kinematics import write_drive_frames, write_static_frames
@@ -72,7 +71,7 @@ def make_write_back(features: Features):
     return write_back
 
 
-@cache
+@factory
 def make_advance(features: Features):
     """Entry point: advances the chosen worlds of groups first <= g < last by substeps * h s.
 

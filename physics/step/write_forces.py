@@ -25,7 +25,7 @@ def write_wrench(
     if point is not None:
         centre = simulation.state.dynamic["position"][:, :bodies][:, chosen]
         turn = turn + np.cross(array("point", point, shape) - centre, push)
-    if simulation.features.rotation == NO_ROTATION and turn.any():
+    if simulation.needed.rotation == NO_ROTATION and turn.any():
         raise ValueError(
             "torque and point must leave frictionless balls at rest without a torque, because "
             "their rotation is not simulated; give a Body in the Scene friction or spin"

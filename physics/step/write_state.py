@@ -92,7 +92,7 @@ def _checked(simulation: Simulation, given: Mapping[str, Any], chosen: int) -> d
     if "orientation" in new:
         new["orientation"] = _unit(new["orientation"])
     spins = np.any(new.get("angular_velocity", 0.0))
-    if simulation.features.rotation == NO_ROTATION and spins:
+    if simulation.needed.rotation == NO_ROTATION and spins:
         raise ValueError(
             "angular_velocity must be zero in a scene of frictionless balls at rest, where "
             "rotation is not simulated; set the angular_velocity of a Body in the Scene instead"

@@ -12,7 +12,7 @@ from physics.analysis.field_limits import longest_step
 from physics.analysis.step_limits import largest_safe_step
 from physics.manybody.limits import neighbourhoods
 from physics.model.build import build
-from physics.model.features import GENERAL, ISOTROPIC, Features
+from physics.model.features import GENERAL, ISOTROPIC, Features, general
 from physics.model.tables import Model
 from physics.scene.drives import Drive
 from physics.scene.fidelity import PRESETS, Fidelity
@@ -53,7 +53,7 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     """
     few = _kinds(scene)
     model, features = build(few, fidelity)
-    lines = [code(fidelity), "", "Models"]
+    lines = [code(fidelity), f"kernel: {_kernel(features)}", "", "Models"]
     lines += [f"  {line}" for line in _modelled(scene, fidelity, features)]
     lines += ["", "Leaves out"]
     lines += [f"  {line}" for line in _left_out(scene, fidelity, features)] or ["  nothing"]
@@ -72,6 +72,16 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
         lines += ["", f"Cost per substep of one {which}, one thread"]
         lines += [f"  {line}" for line in _costs(scene, fidelity, worlds)]
     return "\n".join(lines)
+
+
+def _kernel(features: Features) -> str:
+    """Which kernels there are for a scene, and in what they differ."""
+    more = general(features)
+    if more is None:
+        return "special, made for this scene; no general kernel has all that it needs"
+    pairs = zip(Features._fields, features, more, strict=True)
+    unneeded = [name for name, needs, has in pairs if has is True and not needs]
+    return f"special, or general, which also has: {', '.join(unneeded)}"
 
 
 def _kinds(scene: Scene) -> Scene:

@@ -7,7 +7,9 @@ import numpy as np
 from gymnasium import spaces
 
 from physics import Fidelity, Parameters, Scene, Snapshot, World
+from physics.scene.fidelity import resolve
 from physics.scene.validation import choice
+from physics.step.kernel_choice import general_is_compiled, requested
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.columns import clip_actions
@@ -16,7 +18,7 @@ from rigid_envs.episodes.observations import Observation, Observations
 from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms
-from rigid_envs.tasks import Task
+from rigid_envs.tasks import TASKS, Task
 from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, describe_info
 
 Array = np.ndarray
@@ -58,6 +60,7 @@ class Runner:
         observe_parameters: append the drawn parameters to the observation.
         observe_task_guide: append the task's guide to the observation, see `Task.guide`.
         pixels: what pixels are observed; None if only the state is.
+        kernel: see `rigid_envs.RigidEnv`.
         **arguments: arguments of the task, if it is given by name or class.
 
     Attributes:
@@ -79,6 +82,7 @@ class Runner:
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
         pixels: PixelSettings | None = None,
+        kernel: str | None = None,
         **arguments: Any,
     ) -> None:
         """Builds the worlds. Call `reset` to start episodes."""
@@ -89,6 +93,7 @@ class Runner:
         ranges = self.randomization.check(randomize)
         self._ranges = ranges
         per_world = self.randomization.needs_per_world_parameters(ranges)
+        self._kernel = requested(kernel)
         self.world = self._worlds(scene, fidelity, count, threads, per_world)
         if per_world:
             self.randomization.check_step(self.world, ranges)
@@ -124,9 +129,14 @@ class Runner:
         per_world_parameters: bool,
     ) -> World:
         """The worlds of the episodes."""
+        kernel, registered = self._kernel, type(self.task) in TASKS.values()
+        if kernel == "auto" and registered and not general_is_compiled(
+            scene, resolve(fidelity), per_world_parameters
+        ):  # fmt: skip
+            kernel = "special"  # compiles in less time, if it isn't compiled yet
         return World(
             scene, fidelity, count, threads, per_world_parameters=per_world_parameters,
-            measure_work=self.measures_work,
+            measure_work=self.measures_work, kernel=kernel,
         )  # fmt: skip
 
     def reset(

@@ -18,8 +18,6 @@ from physics import (
     World,
 )
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 LAWS = ["balanced", "solid"]
 T = Compound([(Box((0.04, 0.01, 0.015)), (0, 0, 0)), (Box((0.01, 0.02, 0.015)), (0, -0.03, 0))])
 HALVES = Compound([(Box((0.01, 0.02, 0.02)), (x, 0, 0)) for x in (-0.01, 0.01)])

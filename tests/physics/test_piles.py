@@ -11,8 +11,6 @@ from physics.reference import scenes
 from physics.reference.measures import wave_speed
 from physics.reference.scenes import settled
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SOLID = PRESETS["solid"]
 
 

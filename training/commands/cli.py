@@ -117,6 +117,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     flags.add_scene(scene)
 
+    compiling = command(
+        "compile",
+        handlers.compile_kernels,
+        "Compile kernels ahead of time, for images and clusters.",
+        ("train", ()),
+    )
+    flags.add_compiling(compiling)
+
     plotting = command("plot", handlers.plot, "Plot the learning curve of one or several runs.")
     flags.add_plot(plotting)
 

@@ -65,6 +65,19 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def add_compiling(parser: argparse.ArgumentParser) -> None:
+    """Flags of compiling ahead of time."""
+    parser.add_argument("ids", nargs="*", metavar="ID", help="environments (default: all tasks)")
+    parser.add_argument(
+        "--fidelity", nargs="+", default=[], metavar="PRESET",
+        help="fast, balanced, accurate or solid (default: all)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--general-only", action="store_true",
+        help="only the general kernels, which run nearly every scene",
+    )  # fmt: skip
+
+
 def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:
     """Flags of the search for a fidelity."""
     parser.set_defaults(

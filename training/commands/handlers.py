@@ -193,6 +193,14 @@ def scene(options: argparse.Namespace) -> int:
     return INTERRUPTED if made.interrupted else 0
 
 
+def compile_kernels(options: argparse.Namespace) -> int:
+    """Compiles kernels."""
+    from training.commands import compiling
+
+    compiling.run(options.ids, options.fidelity, options.general_only)
+    return 0
+
+
 def plot(options: argparse.Namespace) -> int:
     """Plots learning curves."""
     from training.results.plot import plot_learning_curves

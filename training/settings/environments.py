@@ -1,6 +1,7 @@
 """Makes environments by id, with error messages that name a wrong id or argument."""
 
 import inspect
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -58,9 +59,14 @@ def make_vector_env(env_id: str, num_envs: int, /, **env_kwargs: Any) -> VectorE
 def make_training_env(config: "TrainConfig", env_kwargs: dict[str, Any]) -> VectorEnv:
     """The vector environment in the reward wrappers of `config`.
 
+    Its worlds run for so long that they wait for a kernel made for them, unless another kind is
+    asked for.
+
     Raises:
         UsageError: As `make_vector_env`, or a wrapper rejects its arguments.
     """
+    if _parameter(config.env_id, "kernel") and "RIGID_ENVS_KERNEL" not in os.environ:
+        env_kwargs = {"kernel": "special", **env_kwargs}
     envs = make_vector_env(config.env_id, config.n_envs, **env_kwargs)
     for name, arguments in parse_wrappers(config.env_wrapper):
         try:

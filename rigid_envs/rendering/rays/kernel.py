@@ -1,16 +1,15 @@
 """The entry of the renderer: pictures of many worlds, one after another."""
 
-from functools import cache
 from typing import Any
 
-from physics.compiler.jit import large_entry
+from physics.compiler.jit import factory, large_entry
 from rigid_envs.rendering.rays.overlay import draw_decals, draw_glass, draw_polygons
 from rigid_envs.rendering.rays.shading import paint, smooth
 from rigid_envs.rendering.rays.shadows import find_shadows
 from rigid_envs.rendering.rays.visibility import find_nearest
 
 
-@cache
+@factory
 def make_draw() -> Any:
     """Entry point: draws the worlds first <= w < last.
 

@@ -5,8 +5,6 @@ import pytest
 
 from physics import Body, Box, Fidelity, Ground, Scene, World
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SLAB = Box((0.05, 0.03, 0.02))
 MASS = 2.0
 TICK = 1e-5

@@ -19,7 +19,7 @@ PACKAGE = Path(physics.__file__).parent
 FALL = """
 from physics import Body, Scene, Sphere, World
 from physics.step.time_layers import make_advance
-world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2)  # both wait for one compilation
+world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2, kernel="special")
 world.advance(1.0)
 compiled = make_advance(world.features).compiled
 stats = getattr(compiled, "stats", None)

@@ -8,8 +8,6 @@ import pytest
 from physics import Body, Box, Ground, Hinge, Material, Motor, Scene, Slider, World
 from tests.physics.constraints.jointed import about_y, energy
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 CUBE = Box((0.05, 0.05, 0.05))
 LAWS = pytest.mark.parametrize("fidelity", ["balanced", "solid"])
 

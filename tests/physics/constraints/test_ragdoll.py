@@ -3,14 +3,11 @@
 import math
 
 import numpy as np
-import pytest
 
 from physics import BallJoint, Body, Box, Hinge
 from physics.rotation import rotate
 from tests.physics.constraints.jointed import energy
 from tests.physics.constraints.test_joints_in_contact import LAWS, world_of
-
-pytestmark = pytest.mark.usefixtures("shared_kernels")
 
 # m above the ground and, as a rotation about a horizontal axis in rad, of the torso
 HEIGHT, TILT = 1.05, 0.3

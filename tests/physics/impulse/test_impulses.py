@@ -11,8 +11,6 @@ from physics.reference import closed_forms, scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import GRAVITY, settled
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SOLID = PRESETS["solid"]
 # with fewer particles a cube would stand on so small a base that it topples
 PARTICLES = Fidelity(law="impulse", geometry="particle", contact_resolution=1.8, spacing=0.25)

@@ -21,8 +21,6 @@ from physics import (
 from physics.reference import scenes
 from physics.reference.scenes import CUBE, GRAVITY
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 STEP = PRESETS["solid"].substep
 PHASES = 40
 

@@ -29,8 +29,6 @@ from physics.model import free_memory
 from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import HALF, heap, wall
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 CUBE = Box((HALF, HALF, HALF))
 
 

@@ -35,7 +35,7 @@ from physics.motion.drive_commands import make_move_command, worlds_last
 from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import HALF
 
-pytestmark = pytest.mark.usefixtures("shared_kernels", "with_all_couplings")
+pytestmark = pytest.mark.usefixtures("with_all_couplings")
 
 
 CUBE = Box((HALF, HALF, HALF))

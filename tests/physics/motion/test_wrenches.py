@@ -7,8 +7,6 @@ import pytest
 
 from physics import Body, Box, Ground, Scene, Sphere, World
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SLAB = Box((0.05, 0.03, 0.02))
 MASS = 2.0
 

@@ -8,8 +8,6 @@ import pytest
 from physics import Body, Box, Drive, Gripper, Ground, Scene, Sphere, Static, World
 from physics.scene.solids import EVERY_GROUP
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 CUBE = Box((0.02, 0.02, 0.02))
 
 

@@ -26,8 +26,6 @@ from physics.reference import closed_forms, scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import CUBE, GRAVITY, settled
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 BALL = Sphere(0.025)
 
 PHASES = 100

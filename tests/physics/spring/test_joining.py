@@ -6,8 +6,6 @@ import pytest
 from physics import Body, Box, Compound, Material, Scene, Sphere, World
 from physics.reference.measures import energy_gain, grazing
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 RIMMED = Compound(
     [
         (Box((0.02, 0.02, 0.005)), (0, 0, 0)),

@@ -8,8 +8,6 @@ import pytest
 from physics import PRESETS, World
 from physics.reference.scenes import landing_cube
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 # errors of restitution that a preset may make
 ERROR = {
     "fast": {"face": 1.3e-3, "edge": 1.5e-3, "corner": 1.9e-3},

@@ -9,8 +9,6 @@ from physics import Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
 from physics.reference import closed_forms, scenes
 from physics.reference.scenes import GRAVITY, settled
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 RADIUS, LENGTH = 0.05, 0.002  # m
 TOLERANCE = {"balanced": 3e-3, "accurate": 5e-4, "solid": 5e-4}
 

@@ -10,8 +10,6 @@ from physics import PRESETS, Body, Box, Ground, Material, Scene, Static, World
 from physics.reference import closed_forms
 from physics.reference.scenes import BALL, CUBE, GRAVITY, tilted_gravity
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SPRINGS = ["fast", "balanced", "accurate"]
 FRICTION = 0.5  # a friction angle of 26.6 degrees
 HALF = 0.02  # m, half width of the cube and radius of the ball

@@ -25,6 +25,13 @@ def test_the_sink_at_rest_is_the_one_that_a_world_has():
         assert sink == pytest.approx(1e3 * (0.02 - world.position[0, 0, 2]), rel=0.02)
 
 
+def test_it_says_which_kernels_there_are():
+    lines = Fidelity().explain(CUBE, costs=False).splitlines()
+    assert lines[1].startswith("kernel: special, or general, which also has: slope, lever")
+    ball = Body(Sphere(0.02), mass=0.1, material=Material(rolling_resistance=1e-3))
+    assert "kernel: special, made for" in Fidelity().explain(Scene([ball], [Ground()]), costs=False)
+
+
 def test_it_names_what_is_modelled_and_what_is_left_out():
     text = Fidelity(friction="viscous", damping="dashpot").explain(CUBE, costs=False)
     assert "linear dashpots" in section(text, "Models")

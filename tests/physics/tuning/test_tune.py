@@ -32,8 +32,6 @@ from physics.tuning.motion import Course, Motion, simulate
 from physics.tuning.reference import Reference
 from physics.tuning.tune import Evidence, Tuned, _rounded_up
 
-pytestmark = pytest.mark.usefixtures("shared_kernels")
-
 SPEED = 1.0
 SLIDE = block_on_ground(linear_velocity=(SPEED, 0, 0))
 ORBIT = Scene(

@@ -1,0 +1,79 @@
+"""Two processes compile one kernel together; neither waits for the other for ever."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from physics.compiler import claims, helper
+from tests.physics.compiler.test_code_cache import FALL, PACKAGE, files, run
+
+# keeps a claim until its input ends
+HOLD = """
+import sys
+from physics.compiler.claims import claimed
+with claimed(sys.argv[1]):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def start(program, cache, *arguments):
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), "NUMBA_CACHE_DIR": str(cache)}
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *arguments], env=environment, cwd=PACKAGE.parent,
+        text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty cache of this process and of those that it starts."""
+    monkeypatch.setattr(claims, "folders", lambda: [tmp_path / "rigid-envs"])
+    monkeypatch.setattr(claims, "_file", {})
+    return tmp_path
+
+
+@pytest.mark.skipif(claims.fcntl is None, reason="no locks on this system")
+@pytest.mark.parametrize("end", ["as it should", "killed"])
+def test_a_claim_ends_with_its_process(cache, end):
+    digest = "0123456789abcdef" * 2
+    holder = start(HOLD, cache, digest)
+    assert holder.stdout.readline() == "held\n"
+    assert claims.is_claimed(digest)
+    assert not claims.is_claimed(digest[::-1])
+    holder.kill() if end == "killed" else holder.stdin.close()
+    begin = time.monotonic()
+    with claims.claimed(digest):  # waits until the other has ended
+        assert time.monotonic() - begin < 30.0
+    holder.wait()
+    assert not claims.is_claimed(digest)
+
+
+def test_with_a_helper_the_results_are_the_same(tmp_path):
+    alone, _ = run(tmp_path / "alone", RIGID_ENVS_COMPILERS="1")
+    together, log = run(tmp_path / "together", RIGID_ENVS_COMPILERS="2")
+    assert together == alone
+    assert "Traceback" not in log
+    assert files(tmp_path / "together").keys() == files(tmp_path / "alone").keys()
+
+
+def test_a_helper_ends_with_the_process_that_started_it(cache):
+    """Killed while it compiles: nothing is left behind, and the next process works."""
+    process = start(FALL, cache)
+    while not (cache / "rigid-envs" / "claims").exists():
+        time.sleep(0.01)
+    time.sleep(0.5)
+    process.kill()
+    process.wait()
+    assert run(cache)[0][0] == 1.0  # compiled by this one
+    assert run(cache)[0][0] == 0.0
+
+
+@pytest.mark.parametrize("given", ["0", "two", ""])
+def test_a_number_of_compilers_that_makes_no_sense(monkeypatch, given):
+    monkeypatch.setenv("RIGID_ENVS_COMPILERS", given)
+    with pytest.raises(ValueError, match="RIGID_ENVS_COMPILERS must be a positive integer"):
+        helper.processes()
