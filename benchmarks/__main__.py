@@ -6,52 +6,26 @@ hours.
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
-from functools import partial
+from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.measure import (
-    accuracy,
-    consistency,
-    features,
-    flags,
-    kernels,
-    memory,
-    pixels,
-    presets,
-    rendering,
-    speed,
-    startup,
-    time_control,
-    worlds,
-)
 from benchmarks.report.provenance import describe, provenance
 from benchmarks.report.results_file import RESULTS, save
-from benchmarks.report.tables import Table, plain
-from benchmarks.trade import measure as trade
+from benchmarks.report.tables import plain
 
-MODULES = {
-    "speed": speed,
-    "worlds": worlds,
-    "presets": presets,
-    "startup": startup,
-    "kernels": kernels,
-    "memory": memory,
-    "rendering": rendering,
-    "pixels": pixels,
-    "accuracy": accuracy,
-    "consistency": consistency,
-    "features": features,
-    "flags": flags,
-    "time_control": time_control,
-}
+# in this order; each is imported when it runs, as some need MuJoCo
+NAMES = (
+    "speed", "worlds", "presets", "startup", "kernels", "memory", "rendering", "pixels", "accuracy",
+    "consistency", "features", "flags", "time_control",
+)  # fmt: skip
+WITH_PANDA = ("speed", "worlds", "pixels")  # of these, those that also measure panda-gym
 
 
 def run() -> None:
     """Prints the tables; --save writes them to benchmarks/results.json as well."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(MODULES))
+    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(NAMES))
     parser.add_argument(
         "--save", action="store_true",
         help=f"write {RESULTS.name}: with names, the other tables in it are kept",
@@ -61,20 +35,14 @@ def run() -> None:
         help="interpreter with panda-gym, see benchmarks/peers/README.md",
     )  # fmt: skip
     options = parser.parse_args()
-    if unknown := [name for name in options.names if name not in MODULES]:
-        parser.error(f"unknown benchmark: {', '.join(unknown)}; known: {', '.join(MODULES)}")
-    benchmarks: dict[str, Callable[[], Iterator[Table]]] = {
-        name: module.measure for name, module in MODULES.items()
-    }
-    for name, module in (("speed", speed), ("worlds", worlds), ("pixels", pixels)):
-        benchmarks[name] = partial(module.measure, options.panda)
-
+    if unknown := [name for name in options.names if name not in NAMES]:
+        parser.error(f"unknown benchmark: {', '.join(unknown)}; known: {', '.join(NAMES)}")
     this_run, tables = provenance(), []
     print(describe(this_run))
-    for name in options.names or benchmarks:
-        start = perf_counter()
-        print(f"\n# {name}\n\n{MODULES[name].__doc__}")
-        for table in benchmarks[name]():
+    for name in options.names or NAMES:
+        start, module = perf_counter(), import_module(f"benchmarks.measure.{name}")
+        print(f"\n# {name}\n\n{module.__doc__}")
+        for table in module.measure(*([options.panda] if name in WITH_PANDA else [])):
             print(plain(table) + "\n", flush=True)
             tables.append(table)
         print(f"({perf_counter() - start:.0f} s)", flush=True)
@@ -85,6 +53,6 @@ def run() -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["trade"]:
-        trade.main(sys.argv[2:])
+        import_module("benchmarks.trade.measure").main(sys.argv[2:])
     else:
         run()

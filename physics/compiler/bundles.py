@@ -45,6 +45,11 @@ class Bundle(types.Type):
         digest = hashlib.sha256(repr((name, content.fields, views)).encode()).hexdigest()[:16]
         super().__init__(name=f"{name}.{digest}")
 
+    def seen_by(self, names: frozenset[str]) -> Any:
+        """What the code of a function depends on that reads no other names than these."""
+        places = zip(self.fields.items(), self.offsets, strict=False)
+        return [(name, kind.name, place) for (name, kind), place in places if name in names]
+
 
 @register_model(Bundle)
 class _BundleModel(models.PrimitiveModel):

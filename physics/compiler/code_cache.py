@@ -26,7 +26,8 @@ import numba
 import numpy as np
 from numba.misc.appdirs import AppDirs
 
-from physics.compiler.identity import digest, hash_files
+from physics.compiler.identity import hash_files, identify
+from physics.compiler.levels import LEVELS, offered
 
 LOGGER = logging.getLogger("physics")
 
@@ -38,9 +39,15 @@ _SETTINGS = (
 )  # fmt: skip
 _MADE_BY = repr((
     hash_files(Path(__file__).parent), numba.__version__, llvmlite.__version__,
-    np.__version__.split(".")[:2], sys.version_info[:2], sys.implementation.cache_tag,
+    np.__version__.split(".")[0], sys.version_info[:2], sys.implementation.cache_tag,
     [getattr(numba.config, name, None) for name in _SETTINGS],
 )).encode()  # fmt: skip
+
+
+# kernels that a wheel brings, compiled for the levels of `levels`; none in a source tree. A note
+# beside them says what they need
+PREBUILT = _PACKAGE / "prebuilt"
+NOTE = "needs.txt"
 
 
 @cache
@@ -74,19 +81,32 @@ class CodeFile:
         Raises:
             NoIdentityError: the function can reach a value whose identity isn't known.
         """
-        key = repr((digest(function), types, target)).encode()
-        self.digest = hashlib.sha256(_MADE_BY + key).hexdigest()[:32]
-        self.name = f"{function.__name__.strip('<>')}.{self.digest}.{kind}"
+        identity = identify(function)
+        # of a bundle only what the function can read: it ignores how the rest is laid out
+        seen = [x.seen_by(identity.names) if hasattr(x, "seen_by") else x for x in types]
+        own = identity.digest, seen
+        name = function.__name__.strip("<>")
+
+        def digest_for(target: Any) -> str:
+            key = repr((*own, target)).encode()
+            return hashlib.sha256(_MADE_BY + key).hexdigest()[:32]
+
+        self.digest = digest_for(target)
+        self.name = f"{name}.{self.digest}.{kind}"
+        self._paths = [folder / self.name for folder in folders()]
+        if kind == "kernel" and PREBUILT.is_dir():
+            names = (f"{name}.{digest_for((target[0], level, ''))}.{kind}" for level in offered())
+            self._paths += [PREBUILT / name for name in names]
 
     def exists(self) -> bool:
         """Whether there is a file, which may be damaged."""
-        return any((folder / self.name).exists() for folder in folders())
+        return any(path.exists() for path in self._paths)
 
     def load(self) -> Any | None:
         """What was saved; None if nothing was, or if it is damaged."""
-        for folder in folders():
+        for path in self._paths:
             try:
-                data = (folder / self.name).read_bytes()
+                data = path.read_bytes()
             except OSError:
                 continue
             hashed, body = data[:_HASH_SIZE], data[_HASH_SIZE:]
@@ -111,6 +131,26 @@ class CodeFile:
             except OSError as error:
                 reason = reason or error
         _warn_once(str(folders()[0]), str(reason))
+
+
+def versions() -> str:
+    """What machine code of this process needs: other versions compile their own."""
+    python = ".".join(map(str, sys.version_info[:2]))
+    return f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {python}"
+
+
+@cache
+def report_unused_kernels() -> None:
+    """Logs once why the kernels of a wheel can't be used, if there are any."""
+    note = PREBUILT / NOTE
+    if not note.is_file():
+        return
+    needs = note.read_text(encoding="utf-8").strip()
+    if needs != versions():
+        LOGGER.warning("the kernels of this wheel need %s, found %s: compiling", needs, versions())
+    elif not offered():
+        LOGGER.warning("the kernels of this wheel need a processor of level %s: compiling",
+                       LEVELS[0])  # fmt: skip
 
 
 @cache

@@ -10,7 +10,7 @@ package does by a hash of its files (see `code_cache`).
 import hashlib
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,34 +28,53 @@ class NoIdentityError(TypeError):
     own = False
 
 
-_known: dict[FunctionType, str] = {}
+class Identity(NamedTuple):
+    """What is known of a function.
+
+    Attributes:
+        digest: 64 hexadecimal digits, the same in every process.
+        names: of all attributes and globals that it and the functions that it can reach read.
+    """
+
+    digest: str
+    names: frozenset[str]
 
 
-def digest(function: Any) -> str:
-    """The identity of a function as 64 hexadecimal digits: the same in every process.
+_known: dict[FunctionType, Identity] = {}
+
+
+def identify(function: Any) -> Identity:
+    """The identity of a function.
 
     Raises:
         NoIdentityError: it can reach a value whose identity isn't known, such as a list.
     """
     if function not in _known:
-        _known[function] = ""  # in place of one that calls itself
+        _known[function] = Identity("", frozenset())  # in place of one that calls itself
+        names: set[str] = set()
         try:
-            _known[function] = hashlib.sha256(repr(_describe(function)).encode()).hexdigest()
+            text = repr(_describe(function, names))
+            digest = hashlib.sha256(text.encode()).hexdigest()
+            _known[function] = Identity(digest, frozenset(names))
         finally:
-            if not _known[function]:
+            if not _known[function].digest:
                 del _known[function]
     return _known[function]
 
 
-def _describe(function: Any) -> Any:
+def _describe(function: Any, names: set[str]) -> Any:
     name = function.__module__, function.__qualname__
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-    closure = [(n, _identity(cell.cell_contents, name)) for n, cell in cells]
-    return name, _identity(function.__defaults__, name), closure, _code(function.__code__, function)
+    closure = [(n, _identity(cell.cell_contents, name, names)) for n, cell in cells]
+    defaults = _identity(function.__defaults__, name, names)
+    return name, defaults, closure, _code(function.__code__, function, names)
 
 
-def _code(code: CodeType, function: Any) -> Any:
-    constants = [_code(c, function) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
+def _code(code: CodeType, function: Any, names: set[str]) -> Any:
+    constants = [
+        _code(c, function, names) if isinstance(c, CodeType) else repr(c) for c in code.co_consts
+    ]
+    names.update(code.co_names)
     known = function.__globals__
     name = function.__module__, function.__qualname__
     reached: list[Any] = []
@@ -65,18 +84,20 @@ def _code(code: CodeType, function: Any) -> Any:
             own = isinstance(value, ModuleType) and value.__name__.partition(".")[0] in _OWN
             if own:  # only what is read from it
                 used = [a for a in code.co_names if hasattr(value, a)]
-                reached += [(n, a, _identity(getattr(value, a), name)) for a in used]
+                reached += [(n, a, _identity(getattr(value, a), name, names)) for a in used]
             else:
-                reached.append((n, _identity(value, name)))
+                reached.append((n, _identity(value, name, names)))
     return code.co_code, constants, code.co_names, code.co_varnames, reached
 
 
-def _identity(value: Any, name: tuple[str, str]) -> Any:
+def _identity(value: Any, name: tuple[str, str], names: set[str]) -> Any:
     """What tells a value from others; `name` is that of the function that can reach it."""
     if isinstance(value, FunctionType):
-        return digest(value)
+        found = identify(value)
+        names.update(found.names)
+        return found.digest
     if isinstance(value, tuple | frozenset):
-        return type(value).__name__, [_identity(part, name) for part in value]
+        return type(value).__name__, [_identity(part, name, names) for part in value]
     if value is None or isinstance(value, bool | int | float | str | bytes | np.dtype | np.generic):
         return type(value).__name__, repr(value)
     if isinstance(value, np.ndarray):
@@ -103,7 +124,7 @@ def _is_compilers(value: Any) -> bool:
 
 def hash_files(folder: Path) -> str:
     """A hash of all Python files in a folder."""
-    digest = hashlib.sha256()
+    whole = hashlib.sha256()
     for path in sorted(folder.glob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
+        whole.update(path.name.encode() + path.read_bytes())
+    return whole.hexdigest()

@@ -12,6 +12,7 @@ independent of its lane and of the other lanes; NaN and infinity keep their mean
 
 import gc
 import logging
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -22,10 +23,12 @@ from typing import Any
 import numpy as np
 from numba import njit, typeof
 from numba.core import config, event, types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
 from physics.compiler import helper, linking
 from physics.compiler.claims import claimed
+from physics.compiler.code_cache import report_unused_kernels
 from physics.compiler.kernel_files import KernelFiles
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 from physics.compiler.views import View
@@ -76,6 +79,19 @@ def _at(value: Any, i: Any) -> Any:
     return lambda value, i: value
 
 
+# Held while an entry is compiled and called for the first time, so that a compilation is logged
+# once. A fork takes it first, then numba's lock, as a compilation does: a child process would wait
+# for a thread that it lacks. What is registered last is called first before a fork
+_first_call = threading.RLock()
+if hasattr(os, "register_at_fork"):  # Windows has no fork
+    for _lock in (global_compiler_lock, _first_call):
+        os.register_at_fork(
+            before=_lock.acquire,
+            after_in_parent=_lock.release,
+            after_in_child=_lock.release,
+        )
+
+
 def entry(function: Any) -> Any:
     """A function that Python calls: cached on disk, without the GIL."""
     return _entry(function, logging.INFO)
@@ -89,12 +105,12 @@ def large_entry(function: Any) -> Any:
 def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         plain = _on_records(function)
-        plain.is_compiled, plain.prepare = lambda *_: True, lambda *_: None
+        plain.is_loaded = plain.is_compiled = lambda *_: True
+        plain.prepare = lambda *_: None
         return plain
     compiled = njit(**_ENTRY)(function)
     compiled._cache = KernelFiles(function)
     direct: list[Any] = []
-    first_call = threading.Lock()  # other threads wait, so a compilation is logged once
 
     def compile_and_call(*arguments: Any) -> Any:
         announcement = event.install_listener("numba:compile", _Announcement(compiled, level))
@@ -102,6 +118,7 @@ def _entry(function: Any, level: int) -> Any:
         with ExitStack() as stack:
             file = compiled._cache.file(types, compiled.targetctx)
             if file and not file.exists():
+                report_unused_kernels()
                 prepare(*arguments)
                 stack.enter_context(claimed(file.digest))  # or waits until it is there
             stack.enter_context(announcement)
@@ -116,7 +133,7 @@ def _entry(function: Any, level: int) -> Any:
         # dozen record arrays at every call would take 3 us, a fifth of a single world's frame
         if direct:
             return direct[0](*arguments)
-        with first_call:
+        with _first_call:
             if not direct:
                 return compile_and_call(*arguments)
         return direct[0](*arguments)
@@ -141,7 +158,7 @@ def _entry(function: Any, level: int) -> Any:
             compiled.compile(types)
 
     entry: Any = call
-    entry.compiled, entry.is_compiled = compiled, is_compiled
+    entry.compiled, entry.is_compiled, entry.is_loaded = compiled, is_compiled, direct.__len__
     entry.prepare, entry.compile_stages = prepare, compile_stages
     return entry
 

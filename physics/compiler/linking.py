@@ -49,6 +49,7 @@ from physics.compiler.code_cache import CodeFile
 from physics.compiler.counting import UseCounters
 from physics.compiler.fusion import fuse_products
 from physics.compiler.identity import NoIdentityError
+from physics.compiler.interrupts import interrupts_deferred
 from physics.compiler.resolution import RememberingContext
 
 # what remains of numba's default pipeline before the lowering
@@ -132,6 +133,10 @@ class _Library(JITCodeLibrary):
         options.loop_vectorization = options.slp_vectorization = True
         builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)
+
+    def _finalize_specific(self) -> None:
+        with interrupts_deferred():  # emits machine code, which LLVM then gives to numba
+            super()._finalize_specific()
 
 
 class _LinkedLibrary(_Library):
@@ -245,6 +250,9 @@ class EntryPipeline(CompilerBase):
         return [manager]
 
 
+_restored: dict[str, Any] = {}  # libraries of stages that this process has read, by digest
+
+
 class StagePipeline(EntryPipeline):
     """For a function that only compiled functions call: it is optimised, not emitted, and cached.
 
@@ -274,7 +282,7 @@ class StagePipeline(EntryPipeline):
                 saved = self._file.load()  # another process may have compiled it
                 if saved is None:
                     return self._compile(func, self._file)
-        return self._restore(*saved)
+        return self._restore(self._file.digest, *saved)
 
     def _compile(self, func: Any, file: CodeFile) -> Any:
         result = super().compile_extra(func)
@@ -287,11 +295,17 @@ class StagePipeline(EntryPipeline):
             file.save((library.name, module.as_bitcode(), described, result.signature))
         return result
 
-    def _restore(self, name: str, bitcode: bytes, described: Any, signature: Any) -> Any:
+    def _restore(
+        self, digest: str, name: str, bitcode: bytes, described: Any, signature: Any
+    ) -> Any:
         context = self.state.targetctx
-        library = self.library(context.codegen(), name)
-        library._final_module = llvm.parse_bitcode(bitcode)
-        library._finalize_final_module()
+        # the bundles that the stage was compiled for may differ in what it doesn't read
+        described.argtypes, signature = self.state.args, signature.replace(args=self.state.args)
+        library = _restored.get(digest)
+        if library is None:  # a symbol must not be linked twice
+            library = _restored[digest] = self.library(context.codegen(), name)
+            library._final_module = llvm.parse_bitcode(bitcode)
+            library._finalize_final_module()
         function = context.get_executable(library, described, Environment.from_fndesc(described))
         context.insert_user_function(function, described, [library])
         return compile_result(

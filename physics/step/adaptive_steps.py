@@ -192,6 +192,7 @@ def make_adaptive_advance(features: Features, tolerance: float) -> Any:
         return lambda *arguments: function(*arguments[:-1], tolerance)  # it has no collision steps
 
     advance = with_tolerance(kernel)
+    advance.is_loaded = kernel.is_loaded
     advance.is_compiled = with_tolerance(kernel.is_compiled)
     advance.prepare = with_tolerance(kernel.prepare)
     return advance

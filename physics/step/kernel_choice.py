@@ -71,12 +71,16 @@ def general_is_compiled(scene: Scene, fidelity: Fidelity, per_world_parameters: 
 def is_compiled(features: Features, base: Model, fidelity: Fidelity) -> bool:
     """Whether the kernel with these features has been compiled, now or by an earlier process."""
     advance = find_advance(features, fidelity)
+    if advance.is_loaded():
+        return True
     return bool(advance.is_compiled(*_arguments(features, base, fidelity)))
 
 
 def prepare(features: Features, base: Model, fidelity: Fidelity) -> None:
     """Starts to compile the kernel with these features in a second process, if it has to be."""
-    find_advance(features, fidelity).prepare(*_arguments(features, base, fidelity))
+    advance = find_advance(features, fidelity)
+    if not advance.is_loaded():
+        advance.prepare(*_arguments(features, base, fidelity))
 
 
 def _arguments(features: Features, base: Model, fidelity: Fidelity) -> tuple[Any, ...]:

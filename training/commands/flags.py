@@ -76,6 +76,14 @@ def add_compiling(parser: argparse.ArgumentParser) -> None:
         "--general-only", action="store_true",
         help="only the general kernels, which run nearly every scene",
     )  # fmt: skip
+    parser.add_argument(
+        "--level",
+        help="x86-64-v3 or x86-64-v4: for all processors of this level, instead of for this one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--into", type=Path, metavar="FOLDER",
+        help="write the kernels there, for a wheel (default: the cache of this machine)",
+    )  # fmt: skip
 
 
 def add_fidelity_tuning(parser: argparse.ArgumentParser) -> None:

@@ -197,6 +197,10 @@ def compile_kernels(options: argparse.Namespace) -> int:
     """Compiles kernels."""
     from training.commands import compiling
 
+    if options.level is not None or options.into is not None:
+        return compiling.run_for(
+            options.level, options.into, options.ids, options.fidelity, options.general_only
+        )
     compiling.run(options.ids, options.fidelity, options.general_only)
     return 0
 

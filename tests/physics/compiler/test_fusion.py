@@ -5,7 +5,7 @@ import pytest
 
 from physics import PRESETS, Body, Box, Gripper, Ground, Material, Scene, World
 from physics.compiler.fusion import fuse_products
-from physics.compiler.jit import LANES
+from physics.compiler.jit import LANES, entry, stage
 
 FUNCTION = """define double @"f"(double %"a", double %"b", double %"c")
 {{
@@ -89,3 +89,21 @@ def test_all_lanes_give_the_same_bits(preset):
         world.advance(4.0 * PRESETS[preset].substep)
         for values in (world.position, world.linear_velocity, world.angular_velocity):
             np.testing.assert_array_equal(values, alike(values[0]))
+
+
+@stage
+def add_product(a, b, c):
+    return a * b + c
+
+
+@entry
+def add_products(values):
+    values[0] = add_product(values[1], values[2], values[3])
+
+
+def test_a_compiled_stage_fuses_its_product():
+    """If the text that llvmlite prints changed, no product would be fused any more, silently."""
+    values = np.array([0.0, 1.0 + 2.0**-30, 1.0 - 2.0**-30, -1.0])
+    assert values[1] * values[2] == 1.0  # rounded
+    add_products(values)
+    assert values[0] == -(2.0**-60)  # rounded once, after the sum

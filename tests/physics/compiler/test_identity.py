@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.compiler.identity import NoIdentityError, digest
+from physics.compiler.identity import NoIdentityError, identify
 
 FACTOR = 2.0
 TABLE = np.arange(3.0)
@@ -18,6 +18,10 @@ class Pair(NamedTuple):
 
     one: float
     other: float
+
+
+def digest(function):
+    return identify(function).digest
 
 
 def make(value):

@@ -28,6 +28,8 @@ from physics.model.features import general
 from physics.reference import meshes
 from physics.scene.fidelity import PRESETS
 from physics.step import kernel_choice
+from rigid_envs.episodes import runner
+from rigid_envs.tasks import Push
 
 ROUGH, SMOOTH = Material(0.5, 0.1), Material(0.0, 0.5)
 CUBE, SLAB = Box((0.02, 0.02, 0.02)), Box((0.02, 0.03, 0.025))
@@ -170,6 +172,18 @@ def test_by_itself_it_takes_what_is_compiled(compiled, count, chosen, monkeypatc
     there = [kinds[name] for name in compiled]
     monkeypatch.setattr(kernel_choice, "is_compiled", lambda features, *_: features in there)
     assert kernel_choice.choose("auto", needed, base, Fidelity(), count) == kinds[chosen]
+
+
+@pytest.mark.parametrize(("general_there", "chosen"), [(True, "general"), (False, "special")])
+def test_a_registered_task_compiles_the_special_kernel_if_there_is_none(
+    general_there, chosen, monkeypatch
+):
+    """Its compilation is the shorter one; a custom task's general kernel serves other scenes."""
+    monkeypatch.setenv("RIGID_ENVS_KERNEL", "auto")
+    monkeypatch.setattr(kernel_choice, "is_compiled", lambda *_: False)
+    monkeypatch.setattr(runner, "general_is_compiled", lambda *_: general_there)
+    assert runner.Runner("push", 1).world.kernel == chosen
+    assert runner.Runner(type("Own", (Push,), {}), 1).world.kernel == "general"
 
 
 def test_snapshots_move_between_kernels():

@@ -12,12 +12,17 @@ def test_it_compiles_general_kernels_and_those_of_environments(capsys, monkeypat
     monkeypatch.setattr(compiling, "compile_general", done.append)
     monkeypatch.setattr(compiling, "_compile_environment", lambda *job: done.append(job))
     assert main(["compile", "RigidEnvs/Push-v0", "--fidelity", "fast", "solid"]) == 0
-    expected = [("RigidEnvs/Push-v0", "fast"), ("RigidEnvs/Push-v0", "solid")]
+    push = "RigidEnvs/Push-v0"
+    expected = [
+        (push, "balanced", "general"),
+        (push, "fast", "special"),
+        (push, "solid", "special"),
+    ]
     assert done == [*GENERAL_KERNELS, *expected]
     shown = capsys.readouterr().out
-    assert "1/7 general kernel, springs ... " in shown
-    assert "7/7 RigidEnvs/Push-v0, solid ... " in shown
-    assert "7 compiled in " in shown
+    assert "1/8 general kernel, springs ... " in shown
+    assert "8/8 RigidEnvs/Push-v0, solid ... " in shown
+    assert "8 compiled in " in shown
 
 
 def test_all_tasks_at_all_presets_by_default(monkeypatch):
@@ -25,9 +30,9 @@ def test_all_tasks_at_all_presets_by_default(monkeypatch):
     monkeypatch.setattr(compiling, "compile_general", done.append)
     monkeypatch.setattr(compiling, "_compile_environment", lambda *job: done.append(job))
     main(["compile", "--general-only"])
-    assert done == list(GENERAL_KERNELS)
+    assert len(done) == len(GENERAL_KERNELS) + 6
     main(["compile"])
-    assert len(done) == 2 * len(GENERAL_KERNELS) + 6 * 4
+    assert len(done) == 2 * (len(GENERAL_KERNELS) + 6) + 6 * 4
 
 
 @pytest.mark.parametrize(
@@ -35,6 +40,7 @@ def test_all_tasks_at_all_presets_by_default(monkeypatch):
     [
         (["Push-v0"], "unknown environment 'Push-v0': choose from RigidEnvs/Push-v0"),
         (["--fidelity", "best"], "unknown fidelity 'best': choose from fast, balanced"),
+        (["--level", "sse"], "--level sse: choose from x86-64-v3, x86-64-v4"),
     ],
 )
 def test_mistakes_are_named_before_anything_is_compiled(capsys, arguments, message):
@@ -43,4 +49,4 @@ def test_mistakes_are_named_before_anything_is_compiled(capsys, arguments, messa
 
 
 def test_an_environment_is_made_and_stepped():
-    compiling._compile_environment("RigidEnvs/Reach-v0", "balanced")
+    compiling._compile_environment("RigidEnvs/Reach-v0", "balanced", "general")
