@@ -13,6 +13,7 @@ from tests.physics.compiler.test_code_cache import PACKAGE
 BALL = """
 import logging, os, signal, sys, threading, time
 from physics import Body, Scene, Sphere, World
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
 world = World(Scene([Body(Sphere(0.1))]), kernel="special")
 compiling = threading.Event()
 def report(record):
