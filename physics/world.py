@@ -50,7 +50,7 @@ class World(Readings):
         measure_work: sum up the work of the drives' servos, see `drive_work`. For worlds side by
             side with equal steps.
         kernel: "special": compiled for what this scene needs, which takes seconds. "general": one
-            for nearly all scenes of the same law; the same bits, at 0.85 to 0.95 of the speed.
+            for nearly all scenes of the same law; the same bits, at 0.83 to 0.89 of the speed.
             Scenes with torsional resistance, tori, particles or work of servos, and joints together
             with contacts, have special kernels only. "auto": what has been compiled before, special
             before general; if neither has, general below 256 worlds. None: what the environment
