@@ -87,8 +87,8 @@ class Features(NamedTuple):
 
 
 # What general kernels can do, by what a scene has. Each of these leaves every bit of the result of
-# a scene that doesn't need it. Left out are resistance and joints among contacts, which cost a fifth
-# of the speed and more, and tori and particles, which add to the time to compile: docs/trade.md
+# a scene that doesn't need it. Left out are resistance and joints among contacts, which cost a
+# fifth of the speed and more, and tori and particles, which take long to compile: docs/trade.md
 _MOTION = ("drives", "gripper", "fields", "wrench")
 _WITH_CONTACTS = (
     "friction", "lever", "plane", "sphere", "box", "capsule", "cylinder", "grid", "axial", "mesh",
