@@ -29,6 +29,7 @@ from numba.extending import overload, register_jitable
 from physics.compiler import helper, linking
 from physics.compiler.claims import claimed
 from physics.compiler.code_cache import report_unused_kernels
+from physics.compiler.interrupts import interrupts_kept
 from physics.compiler.kernel_files import KernelFiles
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 from physics.compiler.views import View
@@ -121,6 +122,7 @@ def _entry(function: Any, level: int) -> Any:
                 report_unused_kernels()
                 prepare(*arguments)
                 stack.enter_context(claimed(file.digest))  # or waits until it is there
+            stack.enter_context(interrupts_kept())
             stack.enter_context(announcement)
             stack.enter_context(_without_garbage_collection())
             result = compiled(*arguments)

@@ -49,7 +49,7 @@ from physics.compiler.code_cache import CodeFile
 from physics.compiler.counting import UseCounters
 from physics.compiler.fusion import fuse_products
 from physics.compiler.identity import NoIdentityError
-from physics.compiler.interrupts import interrupts_deferred
+from physics.compiler.interrupts import interrupts_deferred, raise_lost_interrupt
 from physics.compiler.resolution import RememberingContext
 
 # what remains of numba's default pipeline before the lowering
@@ -210,6 +210,7 @@ class _Lowering(NativeLowering):
         return _Lower
 
     def run_pass(self, state: Any) -> bool:
+        raise_lost_interrupt()
         if stop_before_entries and state.pipeline.library is _Library:
             raise Stopped
         codegen, name = state.targetctx.codegen(), state.func_id.func_qualname

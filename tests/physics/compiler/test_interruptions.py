@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from physics.compiler.interrupts import interrupts_kept
 from tests.physics.compiler.test_code_cache import PACKAGE
 
 BALL = """
@@ -73,6 +74,20 @@ def test_after_ctrl_c_a_kernel_compiles_again(tmp_path):
     word, height = run(INTERRUPTED, tmp_path)
     assert word == "interrupted"
     assert float(height) == pytest.approx(-4.905)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_interrupt_in_a_finalizer_is_not_lost():
+    class Interrupting:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job has none
+    try:
+        with pytest.raises(KeyboardInterrupt), interrupts_kept():
+            Interrupting()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
