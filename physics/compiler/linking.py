@@ -127,10 +127,11 @@ class _Library(JITCodeLibrary):
 
     def _optimize_final_module(self) -> None:
         # Loops that are unrolled first are not vectorised; and a fused product and sum count as one
-        # operation, so more loops were short enough to be unrolled
+        # operation, so more loops were short enough to be unrolled. Straight-line code isn't
+        # vectorised: loops over lanes are, and looking for more took an eighth of a compilation
         options = llvm.create_pipeline_tuning_options(speed_level=3)
         options.loop_unrolling = False
-        options.loop_vectorization = options.slp_vectorization = True
+        options.loop_vectorization, options.slp_vectorization = True, False
         builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)
 
