@@ -5,6 +5,8 @@ first, and so compiles the stages from the other end. Both processes keep stages
 for those that the other has claimed; where they meet, all stages are there. The helper then ends;
 the entry is left to the process that called it. It also ends when that process does.
 
+Of several entries it compiles whole ones, from the last to the first, until the two processes meet.
+
 RIGID_ENVS_COMPILERS=1 turns helpers off.
 """
 
@@ -16,6 +18,7 @@ import pickle
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -26,7 +29,11 @@ from physics.compiler.claims import can_claim, claimed, is_claimed
 _START = "import sys; sys.path[:] = {path!r}; from physics.compiler.helper import main; main()"
 
 
+# module and name of the factory of an entry, and its arguments
+Recipe = tuple[str, str, Any]
+
 _started: set[str] = set()  # claims of the helpers that this process has started
+_helpers: list[Any] = []  # the last one, if there is any
 
 
 def processes() -> int:
@@ -43,28 +50,44 @@ def processes() -> int:
     return min(int(given), os.cpu_count() or 1)
 
 
-def start(recipe: tuple[str, str, Any], types: Any, digest: str) -> None:
-    """Starts a helper for an entry, unless one is at work or isn't allowed.
+def start(recipe: Recipe, types: Any, digest: str) -> None:
+    """Starts a helper that compiles stages of an entry, unless one is at work or isn't allowed.
 
     Args:
-        recipe: module and name of the factory of the entry, and its arguments.
+        recipe: of the entry.
         types: of the entry's arguments.
         digest: of the entry's code.
     """
-    name = _claim_of(digest)
-    if name in _started or processes() < 2 or not can_claim() or is_claimed(name):
+    claim = hashlib.sha256(f"helper of {digest}".encode()).hexdigest()
+    if claim not in _started and can_claim() and not is_claimed(claim):
+        _started.add(claim)
+        _start(claim, [(recipe, types)])
+
+
+def start_whole(entries: Sequence[tuple[Recipe, Any]]) -> None:
+    """Starts a helper that compiles whole entries, one after the other, likewise.
+
+    Args:
+        entries: recipe of each, and types of its arguments.
+    """
+    if can_claim():
+        _start(None, entries)
+
+
+def _start(claim: str | None, entries: Sequence[tuple[Recipe, Any]]) -> None:
+    if processes() < 2 or any(process.poll() is None for process in _helpers):
         return
-    _started.add(name)
     command = [sys.executable, "-c", _START.format(path=sys.path)]
     with suppress(OSError, TypeError, pickle.PicklingError):  # without a helper it takes longer
-        job = pickle.dumps((recipe, types, name))
-        helper = subprocess.Popen(
+        job = pickle.dumps((claim, entries))
+        process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        atexit.register(_end, helper)
-        assert helper.stdin is not None
-        helper.stdin.write(job)
-        helper.stdin.flush()  # and stays open: its end tells the helper that this process has ended
+        _helpers[:] = [process]
+        atexit.register(_end, process)
+        assert process.stdin is not None
+        process.stdin.write(job)
+        process.stdin.flush()  # and stays open: its end tells the helper that this process ended
 
 
 def _end(helper: Any) -> None:
@@ -73,21 +96,21 @@ def _end(helper: Any) -> None:
     helper.wait()
 
 
-def _claim_of(digest: str) -> str:
-    return hashlib.sha256(f"helper of {digest}".encode()).hexdigest()
-
-
 def main() -> None:
     """What the helper does."""
-    (module, name, arguments), types, claim = pickle.load(sys.stdin.buffer)
+    claim, entries = pickle.load(sys.stdin.buffer)
+    os.environ["RIGID_ENVS_COMPILERS"] = "1"  # helpers have none
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    typeinfer.ConstraintNetwork.propagate = _propagate_backwards  # type: ignore[method-assign]
-    with claimed(claim):
+    for (module, name, arguments), types in entries:
         entry = getattr(importlib.import_module(module), name)(*arguments)
-        try:
-            entry.compile_stages(types)
-        except Exception:
-            return
+        with suppress(Exception):
+            if claim is None:
+                if not is_claimed(entry.file(types).digest):
+                    entry.load_types(types)
+                continue
+            typeinfer.ConstraintNetwork.propagate = _propagate_backwards  # type: ignore[method-assign]
+            with claimed(claim):
+                entry.compile_stages(types)
 
 
 def _end_with_parent() -> None:

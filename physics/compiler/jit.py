@@ -15,7 +15,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache, wraps
 from typing import Any
@@ -107,51 +107,60 @@ def _entry(function: Any, level: int) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         plain = _on_records(function)
         plain.is_loaded = plain.is_compiled = lambda *_: True
-        plain.prepare = lambda *_: None
+        plain.prepare = plain.load = lambda *_: None
         return plain
     compiled = njit(**_ENTRY)(function)
     compiled._cache = KernelFiles(function)
     direct: list[Any] = []
 
-    def compile_and_call(*arguments: Any) -> Any:
-        announcement = event.install_listener("numba:compile", _Announcement(compiled, level))
-        types = tuple(map(typeof, arguments))
-        with ExitStack() as stack:
-            file = compiled._cache.file(types, compiled.targetctx)
-            if file and not file.exists():
+    def file(types: Any) -> Any:
+        return compiled._cache.file(types, compiled.targetctx)
+
+    def load_types(types: Any) -> None:
+        """Takes the entry for these types of arguments from disk, or compiles it."""
+        with _first_call, ExitStack() as stack:
+            if direct:
+                return
+            saved = file(types)
+            if saved and not saved.exists():
+                stack.enter_context(interrupts_kept())
                 report_unused_kernels()
-                prepare(*arguments)
-                stack.enter_context(claimed(file.digest))  # or waits until it is there
-            stack.enter_context(interrupts_kept())
-            stack.enter_context(announcement)
+                start_helper(types)
+                stack.enter_context(claimed(saved.digest))  # or waits until it is there
+            stack.enter_context(
+                event.install_listener("numba:compile", _Announcement(compiled, level))
+            )
             stack.enter_context(_without_garbage_collection())
-            result = compiled(*arguments)
-        direct.append(compiled.get_overload(types))
-        return result
+            compiled.compile(types)
+            direct.append(compiled.get_overload(types))
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
         # An entry's arguments always have the same memory layout. Looking up the types of a
         # dozen record arrays at every call would take 3 us, a fifth of a single world's frame
-        if direct:
-            return direct[0](*arguments)
-        with _first_call:
-            if not direct:
-                return compile_and_call(*arguments)
+        if not direct:
+            load(*arguments)
         return direct[0](*arguments)
+
+    def load(*arguments: Any) -> None:
+        load_types(tuple(map(typeof, arguments)))
 
     def is_compiled(*arguments: Any) -> bool:
         """Whether the entry has been compiled, now or by an earlier process."""
         if direct:
             return True
-        file = compiled._cache.file(tuple(map(typeof, arguments)), compiled.targetctx)
-        return file is not None and file.exists()
+        saved = file(tuple(map(typeof, arguments)))
+        return saved is not None and saved.exists()
+
+    def start_helper(types: Any) -> None:
+        saved = file(types)
+        if saved is not None and hasattr(call, "recipe"):
+            helper.start(call.recipe, types, saved.digest)
 
     def prepare(*arguments: Any) -> None:
         """Starts a second process that helps to compile the entry, if that is to be done."""
-        recipe, types = getattr(call, "recipe", None), tuple(map(typeof, arguments))
-        if recipe and not is_compiled(*arguments):
-            helper.start(recipe, types, compiled._cache.file(types, compiled.targetctx).digest)
+        if not is_compiled(*arguments):
+            start_helper(tuple(map(typeof, arguments)))
 
     def compile_stages(types: Any) -> None:
         """Compiles what the entry calls, and not the entry itself."""
@@ -162,7 +171,26 @@ def _entry(function: Any, level: int) -> Any:
     entry: Any = call
     entry.compiled, entry.is_compiled, entry.is_loaded = compiled, is_compiled, direct.__len__
     entry.prepare, entry.compile_stages = prepare, compile_stages
+    entry.load, entry.load_types, entry.file = load, load_types, file
     return entry
+
+
+def load_all(calls: Sequence[tuple[Any, tuple[Any, ...]]]) -> None:
+    """Takes entries from disk or compiles them: this process from the first, another from the last.
+
+    Args:
+        calls: entries, each with its arguments.
+    """
+    missing = [call for call in calls if not call[0].is_compiled(*call[1])]
+    others = [
+        (entry.recipe, tuple(map(typeof, arguments)))
+        for entry, arguments in missing[1:]
+        if hasattr(entry, "recipe")
+    ]
+    if others:
+        helper.start_whole(others[::-1])
+    for entry, arguments in missing:
+        entry.load(*arguments)
 
 
 def factory(make: Any) -> Any:

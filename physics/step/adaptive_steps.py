@@ -195,4 +195,5 @@ def make_adaptive_advance(features: Features, tolerance: float) -> Any:
     advance.is_loaded = kernel.is_loaded
     advance.is_compiled = with_tolerance(kernel.is_compiled)
     advance.prepare = with_tolerance(kernel.prepare)
+    advance.load = with_tolerance(kernel.load)
     return advance

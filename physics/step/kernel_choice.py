@@ -6,11 +6,13 @@ one takes seconds to compile.
 """
 
 import os
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from physics.compiler.jit import LANES, columns
+from physics.compiler.jit import LANES, columns, load_all
 from physics.model.build import build, expand_per_world
 from physics.model.features import Features, general
 from physics.model.state import allocate
@@ -36,15 +38,15 @@ def find_advance(features: Features, fidelity: Fidelity) -> Any:
     return make_adaptive_advance(features, fidelity.tolerance)
 
 
-def requested(kernel: str | None) -> str:
-    """The kind of kernel that is asked for; if None, by RIGID_ENVS_KERNEL, else "auto".
+def requested(kernel: str | None, default: str = "auto") -> str:
+    """The kind of kernel that is asked for; if None, by RIGID_ENVS_KERNEL, else the default.
 
     Raises:
         TypeError, ValueError: not one of `KERNELS`.
     """
     if kernel is not None:
         return choice("kernel", kernel, KERNELS)
-    return choice("RIGID_ENVS_KERNEL", os.environ.get("RIGID_ENVS_KERNEL", "auto"), KERNELS)
+    return choice("RIGID_ENVS_KERNEL", os.environ.get("RIGID_ENVS_KERNEL", default), KERNELS)
 
 
 def choose(kernel: str, needed: Features, base: Model, fidelity: Fidelity, count: int) -> Features:
@@ -81,6 +83,22 @@ def prepare(features: Features, base: Model, fidelity: Fidelity) -> None:
     advance = find_advance(features, fidelity)
     if not advance.is_loaded():
         advance.prepare(*_arguments(features, base, fidelity))
+
+
+def load_kernels(kernel: str, scene: Scene, fidelities: Iterable[Fidelity], count: int) -> None:
+    """Makes sure that the kernels of `count` worlds of a scene at several fidelities are compiled.
+
+    A fidelity that the scene refuses is left out.
+    """
+    calls: dict[int, tuple[Any, tuple[Any, ...]]] = {}
+    for fidelity in fidelities:
+        with suppress(ValueError):
+            base, needed = build(scene, fidelity, False)
+            features = choose(kernel, needed, base, fidelity, count)
+            advance = find_advance(features, fidelity)
+            if id(advance) not in calls:
+                calls[id(advance)] = advance, _arguments(features, base, fidelity)
+    load_all(list(calls.values()))
 
 
 def _arguments(features: Features, base: Model, fidelity: Fidelity) -> tuple[Any, ...]:

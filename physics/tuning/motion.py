@@ -1,7 +1,7 @@
 """The motion of a scene at a fidelity, read at regular times, and what it cost."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from time import perf_counter
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from physics.errors import SimulationDiverged
 from physics.manybody.simulation import MANY
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
+from physics.step.kernel_choice import requested
 from physics.world import World
 
 Array = np.ndarray
@@ -45,7 +46,7 @@ class Motion(NamedTuple):
         velocity: [frames + 1, worlds, bodies, 3] m/s.
         energy: [frames + 1, worlds] J, kinetic and potential.
         kinetic: [frames + 1, worlds] J.
-        penetration: [frames + 1, worlds] m.
+        penetration: [frames + 1, worlds] m, largest since the last frame; zeros if not asked for.
         speed: [frames + 1, worlds] m/s, of the fastest body or drive.
     """
 
@@ -106,13 +107,14 @@ def simulate(
         course: what happens.
         fidelity: how accurately it is simulated.
         timed: repeat short simulations until their cost can be measured.
-        closely: read penetrations and speeds after every substep, not only after frames.
+        closely: read penetrations, and speeds after every substep, not only after frames.
 
     Raises:
         Exception: whatever `start` or `control` raise.
     """
     try:
-        world = World(course.scene, fidelity, course.worlds, threads=1)
+        kernel = requested(None, "special")  # as in training: its cost is what counts
+        world = World(course.scene, fidelity, course.worlds, threads=1, kernel=kernel)
     except ValueError as error:
         return Simulated(None, note=str(error))
     try:
@@ -132,6 +134,28 @@ def simulate(
     return Simulated(motion, max(shortest - called, _LEAST * shortest) / course.simulated)
 
 
+def begin(course: Course, fidelities: Iterable[Fidelity]) -> None:
+    """Calls `start` and `control` once, so that their errors come before anything is compiled.
+
+    Args:
+        course: what happens.
+        fidelities: of which the first that the scene allows is taken.
+
+    Raises:
+        Exception: whatever `start` or `control` raise.
+    """
+    for fidelity in fidelities:
+        try:
+            world = World(course.scene, fidelity, course.worlds, threads=1)
+        except ValueError:
+            continue
+        if course.start is not None:
+            course.start(world)
+        if course.control is not None:
+            course.control(world, 0)
+        return
+
+
 def _call_time(world: World, course: Course) -> float:
     """How many s a call of `advance` takes by itself: one that advances no world."""
     if course.worlds == 1:
@@ -144,29 +168,31 @@ def _call_time(world: World, course: Course) -> float:
     return min(times)
 
 
-def _run(world: World, course: Course, piece: float = math.inf) -> tuple[Motion, float]:
+def _run(world: World, course: Course, piece: float | None = None) -> tuple[Motion, float]:
     """The motion, and the s that the engine needed for it.
 
-    Of the readings every `piece` s within a frame, the largest penetration and speed count.
+    With `piece`, penetrations are read, and of the readings every `piece` s within a frame the
+    largest penetration and speed count.
     """
     world.reset()
-    pieces = max(1, math.ceil(course.frame / piece * (1.0 - 1e-9)))
+    pieces = max(1, math.ceil(course.frame / piece * (1.0 - 1e-9))) if piece else 1
     if course.start is not None:
         course.start(world)
-    frames, spent = [_read(world)], 0.0
+    nothing = np.zeros(world.count)
+    penetration, speed = world.penetration() if piece else nothing, _speed(world)
+    frames, spent = [(*_read(world), penetration, speed)], 0.0
     for k in range(course.frames):
         if course.control is not None:
             course.control(world, k)
-        penetration, speed = np.zeros(world.count), np.zeros(world.count)
+        penetration, speed = nothing, nothing
         for _ in range(pieces):
             begin = perf_counter()
             world.advance(course.frame / pieces)
             spent += perf_counter() - begin
-            if pieces > 1:
+            if piece:
                 penetration = np.maximum(penetration, world.penetration())
                 speed = np.maximum(speed, _speed(world))
-        *others, last, fastest = _read(world)
-        frames.append((*others, np.maximum(last, penetration), np.maximum(fastest, speed)))
+        frames.append((*_read(world), penetration, speed if piece else _speed(world)))
     return Motion(*(np.stack(values) for values in zip(*frames, strict=True))), spent
 
 
@@ -178,8 +204,6 @@ def _read(world: World) -> tuple[Array, ...]:
         world.linear_velocity.copy(),
         kinetic + world.potential_energy(),
         kinetic,
-        world.penetration().copy(),
-        _speed(world),
     )
 
 

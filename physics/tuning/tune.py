@@ -5,13 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from physics.manybody.simulation import MANY
 from physics.scene.fidelity import LAWS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.validation import choice, instance, integer, positive
+from physics.step.kernel_choice import load_kernels, requested
 from physics.tuning.candidates import families, safe_speed
 from physics.tuning.description import code
 from physics.tuning.metrics import METRICS, Metric
-from physics.tuning.motion import FRAME, Control, Course, Start, side_by_side, simulate
+from physics.tuning.motion import FRAME, Control, Course, Start, begin, side_by_side, simulate
 from physics.tuning.reference import CONVERGED, Reference, find_reference
 
 _BUDGET = 15.0  # s of wall time for the reference
@@ -135,7 +137,7 @@ def tune(
     Every family of fidelities (contact law, damping, spacing, integrator ...) is tried from long to
     short steps, until a member is accurate enough or costs more than the best so far. Errors are
     those against a reference that is the engine's own at short steps, see
-    `physics.tuning.reference`. Kernels that are new are compiled, 10 to 30 s for each family; with
+    `physics.tuning.reference`. Kernels that are new are compiled first, 2 to 10 s for each; with
     compiled kernels a scene of a few bodies takes seconds.
 
     Args:
@@ -166,6 +168,11 @@ def tune(
     count = integer("worlds", side_by_side(scene) if worlds is None else worlds, low=1)
     course = Course(scene, frames, FRAME, count, start, control)
     say = progress or (lambda _: None)
+    begin(course, (family.members[-1] for family in families(scene)))
+    if len(scene.bodies) < MANY:
+        say("kernels: those that this scene has not had before are compiled")
+        members = (family.members[-1] for family in families(scene))
+        load_kernels(requested(None, "special"), scene, members, count)
     measure = METRICS[name]
     reference = Reference(None, 0.0, "none is needed", time)
     if measure.needs_reference:

@@ -11,18 +11,23 @@ EDGE_WIDTH = 1.0  # pixels of a box's edge on each face
 
 
 @stage
-def surface(p, camera, sun, lit, dx, dy, dz):
-    """Depth and colour of a primitive where it is seen along a direction; infinite if it is not."""
+def met(p, camera, dx, dy, dz):
+    """Depth of a primitive along a direction, infinite if it isn't met; its normal in its frame."""
     ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
     ex, ey, ez = turned_into(p, dx, dy, dz)
-    a, b, c = p.size[0], p.size[1], p.size[2]
-    t, lx, ly, lz = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
-    if t == math.inf:
-        return t, 0.0, 0.0, 0.0
+    return intersection(p.kind, p.size[0], p.size[1], p.size[2], ox, oy, oz, ex, ey, ez)
+
+
+@stage
+def color(p, camera, sun, lit, dx, dy, dz, t, lx, ly, lz):
+    """Colour of a primitive where `met` found it."""
     nx, ny, nz = turned_out_of(p, lx, ly, lz)
     diffuse, shine = brightness(nx, ny, nz, dx, dy, dz, sun, lit, p.gloss)
     if p.kind == BOX and p.edge < 1.0:
         # how far the point is from the nearest edge of its face
+        ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
+        ex, ey, ez = turned_into(p, dx, dy, dz)
+        a, b, c = p.size[0], p.size[1], p.size[2]
         gx, gy, gz = a - abs(ox + t * ex), b - abs(oy + t * ey), c - abs(oz + t * ez)
         gx, gy, gz = (
             gx if lx == 0.0 else math.inf, gy if ly == 0.0 else math.inf,
@@ -31,18 +36,7 @@ def surface(p, camera, sun, lit, dx, dy, dz):
         apart = min(gx, min(gy, gz)) / (t * camera.pixel)
         cover = min(max(EDGE_WIDTH + 0.5 - apart, 0.0), 1.0)
         diffuse *= 1.0 - cover * (1.0 - p.edge)
-    return (
-        t, p.color[0] * diffuse + shine, p.color[1] * diffuse + shine, p.color[2] * diffuse + shine
-    )  # fmt: skip
-
-
-@stage
-def distance(p, camera, dx, dy, dz):
-    """Depth of a primitive where it is seen along a direction; infinite if it is not."""
-    ox, oy, oz = seen_from(p, camera.eye[0], camera.eye[1], camera.eye[2])
-    ex, ey, ez = turned_into(p, dx, dy, dz)
-    t, _, _, _ = intersection(p.kind, p.size[0], p.size[1], p.size[2], ox, oy, oz, ex, ey, ez)
-    return t
+    return p.color[0] * diffuse + shine, p.color[1] * diffuse + shine, p.color[2] * diffuse + shine
 
 
 @stage
@@ -83,7 +77,13 @@ def paint(primitives, camera, sun, samples, shown, hidden, ground, spans, rgb):
                 continue
             lit = sunlit(hidden[row, column], samples)
             dx, dy, dz = sight(camera, row + 0.5, column + 0.5)
-            _, red, green, blue = surface(primitives[n], camera, sun, lit, dx, dy, dz)
+            t, lx, ly, lz = met(primitives[n], camera, dx, dy, dz)
+            if t == math.inf:  # at a border, by rounding
+                red, green, blue = 0.0, 0.0, 0.0
+            else:
+                red, green, blue = color(
+                    primitives[n], camera, sun, lit, dx, dy, dz, t, lx, ly, lz
+                )  # fmt: skip
             rgb[row, column, 0] = byte(red)
             rgb[row, column, 1] = byte(green)
             rgb[row, column, 2] = byte(blue)
@@ -133,14 +133,15 @@ def smooth(primitives, camera, sun, samples, shown, hidden, ground, around, span
                 dx, dy, dz = sight(camera, row + down, column + across)
                 # the ground hides what is below it
                 best, nearest = -1, -camera.eye[2] / dz if dz < 0.0 else math.inf
+                nx, ny, nz = 0.0, 0.0, 0.0
                 for k in range(count):
-                    t = distance(primitives[around[k, 0]], camera, dx, dy, dz)
+                    t, lx, ly, lz = met(primitives[around[k, 0]], camera, dx, dy, dz)
                     if (t < nearest) & (t > camera.near):
-                        best, nearest = k, t
+                        best, nearest, nx, ny, nz = k, t, lx, ly, lz
                 if best >= 0:
                     p = primitives[around[best, 0]]
                     share = sunlit(around[best, 1], samples)
-                    _, r, g, b = surface(p, camera, sun, share, dx, dy, dz)
+                    r, g, b = color(p, camera, sun, share, dx, dy, dz, nearest, nx, ny, nz)
                     red, green, blue = red + byte(r), green + byte(g), blue + byte(b)
                 elif tile_row >= 0:
                     dark = 1.0 - lit
