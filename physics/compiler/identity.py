@@ -74,6 +74,8 @@ def _code(code: CodeType, function: Any, names: set[str]) -> Any:
     constants = [
         _code(c, function, names) if isinstance(c, CodeType) else repr(c) for c in code.co_consts
     ]
+    if code is function.__code__ and function.__doc__ and code.co_consts[0] == function.__doc__:
+        del constants[0]  # the documentation
     names.update(code.co_names)
     known = function.__globals__
     name = function.__module__, function.__qualname__

@@ -4,7 +4,7 @@ import copy
 import math
 import pickle
 import re
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -31,14 +31,16 @@ from tests.physics.test_world import digests
 COUNT = LANES + 3  # a group, and a part of one
 
 
-def everything():
+def everything(resistance=0.0):
     """All shapes, a static and a tool; sizes in which no body changes another's samples."""
     cube = Body(
         Box((0.02, 0.02, 0.025)),
         mass=0.2,
         position=(0.0, 0.0, 0.06),
         angular_velocity=(1.0, 2.0, 3.0),
-        material=Material(0.4, 0.2, rolling_resistance=1e-3, spinning_resistance=5e-4),
+        material=Material(
+            0.4, 0.2, rolling_resistance=resistance, spinning_resistance=0.5 * resistance
+        ),
     )
     ball = Body(Sphere(0.04), mass=0.05, position=(0.0, 0.0, 0.2), linear_velocity=(0.1, 0.0, 0.0))
     rod = Body(Capsule(0.03, 0.03), position=(0.1, 0.0, 0.2))
@@ -99,15 +101,15 @@ def block():
         (scenes.push_like, "solid"),
         (everything, "balanced"),
         (everything, "solid"),
+        (partial(everything, 1e-3), "balanced"),
+        (partial(everything, 1e-3), "solid"),
     ],
 )
 def test_a_world_with_parameters_is_a_world_of_a_scene_that_has_them_built_in(
     make, fidelity, stress
 ):
-    if make is scenes.push_like and fidelity == "solid" and not stress:
-        pytest.skip(
-            "a minute to compile for what the scene of everything has, too; see make stress"
-        )
+    if isinstance(make, partial) and not stress:
+        pytest.skip("two kernels of its own; see make stress")
     scene = make()
     worlds = varied(scene, fidelity)
     for _ in range(4):

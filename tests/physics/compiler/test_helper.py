@@ -53,8 +53,8 @@ def test_a_claim_ends_with_its_process(cache, end):
 
 
 def test_with_a_helper_the_results_are_the_same(tmp_path):
-    alone, _ = run(tmp_path / "alone", RIGID_ENVS_COMPILERS="1")
-    together, log = run(tmp_path / "together", RIGID_ENVS_COMPILERS="2")
+    alone, _ = run(tmp_path / "alone", FALL, RIGID_ENVS_COMPILERS="1")
+    together, log = run(tmp_path / "together", FALL, RIGID_ENVS_COMPILERS="2")
     assert together == alone
     assert "Traceback" not in log
     assert files(tmp_path / "together").keys() == files(tmp_path / "alone").keys()
@@ -68,8 +68,8 @@ def test_a_helper_ends_with_the_process_that_started_it(cache):
     time.sleep(0.5)
     process.kill()
     process.wait()
-    assert run(cache)[0][0] == 1.0  # compiled by this one
-    assert run(cache)[0][0] == 0.0
+    assert run(cache, FALL)[0][0] == 1.0  # compiled by this one
+    assert run(cache, FALL)[0][0] == 0.0
 
 
 @pytest.mark.parametrize("given", ["0", "two", ""])

@@ -5,6 +5,7 @@ adaptive pair can differ in parameters. So there is one kernel per integrator.
 """
 
 import math
+from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -54,7 +55,13 @@ def jacobi_spin(moments, spin, times):
 
 def exact_orientation(moments, spin, time):
     """Quaternion of a torque-free body after `time` s, from the identity."""
-    L = moments * spin
+    return _exact_orientation(tuple(moments), tuple(spin), time)
+
+
+@cache
+def _exact_orientation(moments, spin, time):
+    moments = np.array(moments)
+    L = moments * np.array(spin)
 
     def rate(_, q):
         q = q / np.linalg.norm(q)

@@ -486,15 +486,18 @@ def test_two_cubes_part_after_a_fast_impact_too(speed):
     ("cubes", "fidelity"),
     [(2, "fast"), (3, "fast"), (5, "balanced"), (10, Fidelity(substep=0.5e-3))],
 )
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_tower_stands_for_a_minute(cubes, fidelity, seed):
-    world = settled(scenes.tower(cubes, seed=seed), fidelity)
+def test_a_tower_stands_for_a_minute(cubes, fidelity, stress):
+    """Four towers side by side, with different offsets."""
+    towers = [scenes.tower(cubes, seed=seed) for seed in range(4)]
+    world = World(towers[0], fidelity, count=4)
+    world.set_state(position=[[body.position for body in tower.bodies] for tower in towers])
+    world.advance(1.0)
     start = world.position.copy()
-    world.advance(60.0)
+    world.advance(60.0 if cubes < 10 or stress else 10.0)
     assert np.abs(world.position - start).max() < 1e-3
-    # and stands upright, no deeper in itself than it is stiff; five are near buckling and lean
-    assert np.abs(start[0, :, :2]).max() < (3e-3 if cubes == 5 else 1e-3)
-    assert start[0, -1, 2] > 0.04 * cubes - 0.02 - 0.006
+    # and stand upright, no deeper in themselves than they are stiff; five nearly buckle and lean
+    assert np.abs(start[..., :2]).max() < (3e-3 if cubes == 5 else 1e-3)
+    assert start[:, -1, 2].min() > 0.04 * cubes - 0.02 - 0.006
 
 
 @pytest.mark.parametrize("yaw", [0.0, 45.0])

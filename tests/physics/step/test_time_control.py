@@ -48,7 +48,12 @@ def scene(restitution=0.5, gravity=0.0, second_wall=1.0, names=tuple(AWAY)):
 def world(time_control, count, restitution=0.5, threads=1, state=None, **other):
     """Worlds with poses and velocities by body name; the others are away, at rest."""
     names = tuple(AWAY) if time_control in WHOLE else ("bullet",)
-    made = World(scene(restitution, names=names, **other), fidelity(time_control), count, threads)
+    # other files have worlds with these two; what this one alone compiles is kept small
+    kernel = "general" if time_control in ("fixed", "swept") else "special"
+    made = World(
+        scene(restitution, names=names, **other), fidelity(time_control), count, threads,
+        kernel=kernel,
+    )  # fmt: skip
     put(made, **(state or {}))
     return made
 
