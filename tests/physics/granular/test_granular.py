@@ -41,13 +41,15 @@ def advance(sim, steps):
     assert sim.advance(steps * STEP, sim.everyone)
 
 
-def mixed_scene():
-    """Rods and spheres of other sizes and materials, over a ground between two walls."""
+def some_scene(mixed=True):
+    """Rods, and if `mixed` spheres of other sizes and materials, over a ground with two walls."""
     draw = np.random.default_rng(3)
     rod, pair = chess_piece(R), Particles([[0, 0, R], [0, 0, -R]], 1.5 * R)
     soft = Material(friction=0.9, stiffness=3000.0)
     shapes = [rod, rod, Sphere(R), rod, pair, Sphere(1.5 * R), rod]
     materials = [ROUGH, ROUGH, Material(0.2, 0.6), ROUGH, soft, ROUGH, ROUGH]
+    if not mixed:
+        shapes, materials = [rod] * 7, [ROUGH] * 7
     bodies = [
         Body(
             shape, density=1000.0, material=material, orientation=tuple(draw.normal(size=4)),
@@ -82,9 +84,17 @@ def potential_energy(sim):
 
 
 @pytest.mark.parametrize("friction", ["viscous", "coulomb"])
-def test_bodies_move_as_in_the_dense_engine(friction):
-    """Until round-off has grown; with lists that are made again and bodies that are sorted."""
-    scene = mixed_scene()
+def test_bodies_move_as_in_the_dense_engine(friction, stress):
+    """Until round-off has grown; with lists that are made again and bodies that are sorted.
+
+    Equal bodies have kernels of their own. The long form has equal and mixed ones at both frictions.
+    """
+    for mixed in (True, False) if stress else (friction == "coulomb",):
+        compare(some_scene(mixed), friction)
+
+
+def compare(scene, friction):
+    """A heap moves as the same scene in the dense engine."""
     heap = simulation(scene, friction)
     dense = Simulation(scene, FIDELITIES[friction], 1, 1, False)
     forces = 0.0
@@ -126,7 +136,10 @@ def test_the_refreshed_forces_and_a_report_agree():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_contact_is_lost(seed):
-    """The reported pairs are those of all particles that overlap; sizes differ by 1:20."""
+    """The reported pairs are those of all particles that overlap; sizes differ by 1:20.
+
+    The statics are far away, for a kernel that `some_scene` has, too.
+    """
     draw = np.random.default_rng(seed)
     radii = np.exp(draw.uniform(np.log(0.01), np.log(0.2), 60))
     bodies = [Body(Sphere(r), position=tuple(draw.uniform(-0.5, 0.5, 3))) for r in radii]
@@ -137,7 +150,8 @@ def test_no_contact_is_lost(seed):
         )
         for _ in range(120)
     ]
-    heap = simulation(Scene(bodies=bodies))
+    statics = [Ground(height=-50.0), Static(Box((1.0, 1.0, 1.0)), position=(50.0, 0.0, 0.0))]
+    heap = simulation(Scene(bodies=bodies, statics=statics))
     assert heap.refresh()
     rows = heap.state.dynamic[0]
     for moved in (0.0, 0.05):  # the second time the list is older than the positions
@@ -298,7 +312,7 @@ def test_what_is_not_supported_is_named(scene, fidelity, reason):
 
 
 def test_what_is_supported():
-    assert supports(mixed_scene(), FIDELITIES["coulomb"]) == ""
+    assert supports(some_scene(), FIDELITIES["coulomb"]) == ""
 
 
 def test_ready_bodies_have_principal_axes():
