@@ -87,7 +87,7 @@ def potential_energy(sim):
 def test_bodies_move_as_in_the_dense_engine(friction, stress):
     """Until round-off has grown; with lists that are made again and bodies that are sorted.
 
-    Equal bodies have kernels of their own. The long form has equal and mixed ones at both frictions.
+    Equal bodies have kernels of their own. The long form has both kinds at both frictions.
     """
     for mixed in (True, False) if stress else (friction == "coulomb",):
         compare(some_scene(mixed), friction)
