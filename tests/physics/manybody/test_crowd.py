@@ -51,7 +51,7 @@ def test_a_heap_is_that_of_all_pairs_and_bitwise_the_same_for_1_2_and_4_threads(
     worlds = [World(heap(40), law, threads=n) for n in (1, 2, 4)]
     assert all(isinstance(world._simulation, many.CrowdSimulation) for world in worlds)
     assert state_of(worlds[0]) == state_of(worlds[1])
-    all_pairs = Simulation(heap(40), fidelity, 1, 1, False)
+    all_pairs = Simulation(heap(40), fidelity, 1, 1, False, kernel="general")
     apart = []
     for _ in range(20):
         for world in worlds:
@@ -88,7 +88,7 @@ def mixture() -> Scene:
 @pytest.mark.parametrize("law", ["balanced", "solid"])
 def test_bodies_of_all_shapes_touch_as_among_all_pairs(law):
     world = World(mixture(), law)
-    all_pairs = Simulation(mixture(), world.fidelity, 1, 1, False)
+    all_pairs = Simulation(mixture(), world.fidelity, 1, 1, False, kernel="general")
     apart = []
     for _ in range(12):
         world.advance(0.02)
@@ -209,7 +209,7 @@ def test_a_wrench_lifts_one_cube():
 
 def test_the_largest_stable_step_is_that_of_all_pairs():
     world = World(heap(40), "balanced")
-    all_pairs = Simulation(heap(40), world.fidelity, 1, 1, False)
+    all_pairs = Simulation(heap(40), world.fidelity, 1, 1, False, kernel="general")
     world.advance(0.1)
     all_pairs.advance(0.1, all_pairs.everyone)
     expected = LaneQueries(all_pairs).largest_stable_step(0)
