@@ -96,10 +96,11 @@ def test_a_double_pendulum_follows_the_equations_of_lagrange():
     )
 
 
-def test_a_double_pendulum_keeps_its_energy_for_a_minute():
+def test_a_double_pendulum_keeps_its_energy(stress):
     world = double_pendulum("accurate")
     before = float(energy(world)[0])
-    assert np.abs(energy(film(world, 0.1, 600)) - before).max() < 1e-4 * MASS * G
+    frames = film(world, 0.1, 600 if stress else 200)
+    assert np.abs(energy(frames) - before).max() < 1e-4 * MASS * G
     assert world.joint_error().max() < 1e-12
 
 
