@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from physics.granular.simulation import GranularSimulation
-from physics.granular.support import supports
 from physics.model import free_memory
 from physics.reference.heaps import heap_scene
 from physics.rotation import rotate
@@ -85,27 +84,20 @@ def potential_energy(sim):
 
 @pytest.mark.parametrize("friction", ["viscous", "coulomb"])
 def test_bodies_move_as_in_the_dense_engine(friction, stress):
-    """Until round-off has grown; with lists that are made again and bodies that are sorted.
-
-    Equal bodies have kernels of their own. The long form has both kinds at both frictions.
-    """
+    """Until round-off has grown; with lists that are made again and bodies that are sorted."""
+    # equal bodies have kernels of their own; the long form has both kinds at both frictions
     for mixed in (True, False) if stress else (friction == "coulomb",):
-        compare(some_scene(mixed), friction)
-
-
-def compare(scene, friction):
-    """A heap moves as the same scene in the dense engine."""
-    heap = simulation(scene, friction)
-    dense = Simulation(scene, FIDELITIES[friction], 1, 1, False)
-    forces = 0.0
-    for _ in range(60):
-        advance(heap, 10)
-        assert dense.advance(10 * STEP, dense.everyone)
-        forces = max(forces, np.abs(dense.state.dynamic["force"][..., :2]).max())
-        for name, scale in (("position", 1.0), ("orientation", 1.0), ("momentum", 0.1)):
-            ours, theirs = heap.state.dynamic[name], dense.state.dynamic[name]
-            assert np.abs(ours - theirs).max() < 1e-8 * scale
-    assert forces > 1.0  # they have touched
+        scene, forces = some_scene(mixed), 0.0
+        heap = simulation(scene, friction)
+        dense = Simulation(scene, FIDELITIES[friction], 1, 1, False)
+        for _ in range(60):
+            advance(heap, 10)
+            assert dense.advance(10 * STEP, dense.everyone)
+            forces = max(forces, np.abs(dense.state.dynamic["force"][..., :2]).max())
+            for name, scale in (("position", 1.0), ("orientation", 1.0), ("momentum", 0.1)):
+                ours, theirs = heap.state.dynamic[name], dense.state.dynamic[name]
+                assert np.abs(ours - theirs).max() < 1e-8 * scale, mixed
+        assert forces > 1.0  # they have touched
 
 
 @pytest.mark.parametrize("friction", ["viscous", "coulomb"])
@@ -136,10 +128,7 @@ def test_the_refreshed_forces_and_a_report_agree():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_contact_is_lost(seed):
-    """The reported pairs are those of all particles that overlap; sizes differ by 1:20.
-
-    The statics are far away, for a kernel that `some_scene` has, too.
-    """
+    """The reported pairs are those of all particles that overlap; sizes differ by 1:20."""
     draw = np.random.default_rng(seed)
     radii = np.exp(draw.uniform(np.log(0.01), np.log(0.2), 60))
     bodies = [Body(Sphere(r), position=tuple(draw.uniform(-0.5, 0.5, 3))) for r in radii]
@@ -150,6 +139,7 @@ def test_no_contact_is_lost(seed):
         )
         for _ in range(120)
     ]
+    # far away, for a kernel that `some_scene` has, too
     statics = [Ground(height=-50.0), Static(Box((1.0, 1.0, 1.0)), position=(50.0, 0.0, 0.0))]
     heap = simulation(Scene(bodies=bodies, statics=statics))
     assert heap.refresh()
@@ -309,10 +299,6 @@ def test_what_is_not_supported_is_named(scene, fidelity, reason):
     asked = replace(FIDELITIES["viscous"], **fidelity)
     with pytest.raises(ValueError, match=reason):
         GranularSimulation(scene, asked, 1, 1)
-
-
-def test_what_is_supported():
-    assert supports(some_scene(), FIDELITIES["coulomb"]) == ""
 
 
 def test_ready_bodies_have_principal_axes():
