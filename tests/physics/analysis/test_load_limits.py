@@ -99,15 +99,15 @@ def test_loads_add_up():
     np.testing.assert_allclose(least(loaded, mass=masses)[0], weight + one, rtol=1e-12)
 
 
-def test_what_a_range_accepts_is_accepted_anywhere_in_it():
+def test_what_a_range_accepts_is_accepted_anywhere_in_it(stress):
     """Also where the scene's own body is lighter than it should be."""
     light = Body(Box((0.02,) * 3), mass=0.002, position=(0.0, 0.0, 0.02))
     heavy = Body(Box((0.02,) * 3), mass=0.1, position=(0.1, 0.0, 0.02))
     drive = Drive(Sphere(0.015), MASS, FORCE, (0.0, 0.0, 0.1))
     bounds = ParameterLimits(Scene([light, heavy], [Ground()], [drive]), PRESETS["balanced"])
     own = Parameters.of(Scene([light, heavy]))
-    draw, accepted = np.random.default_rng(0), 0
-    for _ in range(2000):
+    draw, accepted, ranges = np.random.default_rng(0), 0, 2000 if stress else 400
+    for _ in range(ranges):
         ends = np.sort(10.0 ** draw.uniform(-0.8, 1.0, (2, 1, 2)), axis=0) * own.mass
         sizes = np.sort(draw.uniform(0.8, 1.6, (2, 1, 1)), axis=0) * np.ones((1, 2))
         low, high = (own._replace(mass=m, size=z) for m, z in zip(ends, sizes, strict=True))
@@ -122,7 +122,7 @@ def test_what_a_range_accepts_is_accepted_anywhere_in_it():
             size=low.size + share[1] * (high.size - low.size),
         )
         bounds.loads.check(inside)
-    assert 50 < accepted < 1000
+    assert ranges / 40 < accepted < ranges / 2
 
 
 def test_message_says_what_would_be_right():

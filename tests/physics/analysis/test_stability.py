@@ -72,8 +72,11 @@ def predicted(some, damping, start):
     return step
 
 
-def runs_away(some, damping, start, step):
-    """Whether slight disturbances grow at a step; they are let fade at a tenth of it before."""
+def runs_away(some, damping, start, step, patience):
+    """Whether slight disturbances grow at a step.
+
+    Before, they are let fade at a tenth of it, for at most `patience` tenths: a capsule rolls on.
+    """
     rng = np.random.default_rng(0)
     world = World(some, Fidelity(substep=step, damping=damping), count=8, allow_unstable=True)
     at_rest(world, start)
@@ -82,7 +85,7 @@ def runs_away(some, damping, start, step):
         linear_velocity=1e-7 * rng.normal(size=shape),
         angular_velocity=5e-6 * rng.normal(size=shape),
     )
-    for _ in range(20000):
+    for _ in range(patience):
         world.advance(0.1 * step)
         if world.kinetic_energy().max() < 1e-16:
             break
@@ -117,10 +120,11 @@ def test_the_largest_stable_step_is_predicted_within_a_tenth(kind, damping, rest
     start = World(some, Fidelity(substep=2e-5, damping=damping), allow_unstable=True)
     start.advance(1.0)
     limit = predicted(some, damping, start)
+    patience = 20000 if stress else 3000
     for share in (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9) if stress else (0.1, 0.5, 0.9):
-        assert not runs_away(some, damping, start, share * limit), share
+        assert not runs_away(some, damping, start, share * limit, patience), share
     for share in (1.1, 1.2) if stress else (1.1,):
-        assert runs_away(some, damping, start, share * limit), share
+        assert runs_away(some, damping, start, share * limit, patience), share
 
 
 def test_impulses_have_no_largest_step_but_that_of_a_servo():

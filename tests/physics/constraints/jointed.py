@@ -36,6 +36,20 @@ def energy(world):
     return world.kinetic_energy() + world.potential_energy()
 
 
+def film(world, frame, frames):
+    """Advances a world by frames of a time in s; returns its states after each, side by side.
+
+    A query of all these worlds takes as long as one of a single world.
+    """
+    shown, state = World(world.scene, world.fidelity, frames), world._simulation.state
+    for k in range(frames):
+        world.advance(frame)
+        shown._simulation.state.dynamic[k] = state.dynamic[0]
+        shown._simulation.state.world[k] = state.world[0]
+    shown._simulation.changed()
+    return shown
+
+
 def linkage(corners, masses=None, gravity=(0.0, 0.0, -9.81), fidelity="balanced", motors=None):
     """Bars in a closed loop, on hinges about y at `corners` in x and z; both ends on the world.
 

@@ -6,19 +6,16 @@ import numpy as np
 import pytest
 
 from physics import Box, Hinge, Scene, SimulationDiverged, World
-from tests.physics.constraints.jointed import about_y, energy, ghost, linkage, pendulum
+from tests.physics.constraints.jointed import about_y, energy, film, ghost, linkage, pendulum
 
 FOUR_BARS = [(0.0, 0.0), (-0.1, 0.3), (0.35, 0.45), (0.4, 0.0)]
 
 
 def energies(world, seconds, frame=0.01):
     """[frames] J; on the way the joints hold."""
-    found = []
-    for _ in range(round(seconds / frame)):
-        world.advance(frame)
-        assert world.joint_error().max() < 1e-9
-        found.append(float(energy(world)[0]))
-    return np.array(found)
+    frames = film(world, frame, round(seconds / frame))
+    assert frames.joint_error().max() < 1e-9
+    return energy(frames)
 
 
 @pytest.mark.parametrize("speed", [1.0, 10.0])

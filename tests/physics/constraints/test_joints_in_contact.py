@@ -5,7 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from physics import Body, Box, Ground, Hinge, Material, Motor, Scene, Slider, World
+from physics import (
+    Body,
+    Box,
+    Drive,
+    Gripper,
+    Ground,
+    Hinge,
+    Material,
+    Motor,
+    Scene,
+    Slider,
+    Sphere,
+    SurfaceDrag,
+    World,
+)
 from tests.physics.constraints.jointed import about_y, energy
 
 CUBE = Box((0.05, 0.05, 0.05))
@@ -13,9 +27,22 @@ LAWS = pytest.mark.parametrize("fidelity", ["balanced", "solid"])
 
 
 def world_of(bodies, joints, fidelity, count=1, gravity=(0.0, 0.0, -9.81)):
-    """A world with ground."""
-    ground = Ground(Material(0.5, restitution=0.0))
-    return World(Scene(bodies, [ground], gravity=gravity, joints=joints), fidelity, count)
+    """A world with ground, and out of reach what else a workshop with joints has.
+
+    Joints and contacts have no general kernel. So all scenes here, and `workshop` of
+    `manybody.test_mechanisms`, hold the same kinds of things and share a kernel per law.
+    """
+    ground, far = Ground(Material(0.5, restitution=0.0)), 50.0  # m
+    slab = Body(Box((0.05, 0.05, 0.02)), mass=1.0, position=(far, 0, 0.02))
+    drives = [
+        *(Drive(Sphere(0.02), 0.2, 20.0, (far, y, 1)) for y in (1, 2)),
+        Gripper(Box((0.02, 0.02, 0.02)), 0.2, 20.0, 5.0, (far, 3, 1), 0.07),
+    ]
+    drag = SurfaceDrag(1.2, 1.0, body=len(bodies))
+    scene = Scene(
+        [*bodies, slab], [ground], gravity=gravity, drives=drives, joints=joints, fields=[drag]
+    )
+    return World(scene, fidelity, count)
 
 
 @LAWS

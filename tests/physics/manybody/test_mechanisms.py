@@ -13,6 +13,7 @@ from physics import (
     Distance,
     Drag,
     Drive,
+    Fidelity,
     Gripper,
     Ground,
     Hinge,
@@ -30,7 +31,7 @@ from physics.analysis.lane_queries import LaneQueries
 from physics.manybody import kinds
 from physics.manybody import simulation as many
 from physics.manybody.mechanisms import find_mechanisms
-from physics.model.build import couplings
+from physics.model.build import build
 from physics.motion.drive_commands import make_move_command, worlds_last
 from physics.step.simulation import Simulation
 from tests.physics.manybody.scenes import HALF
@@ -63,7 +64,11 @@ def workshop() -> Scene:
     lift = len(bodies)
     bodies += [cube(0.5, 0.0, 0.2), cube(0.5, 0.0, 0.3, density=300.0)]
     joints += [Slider(lift, None, limits=(-0.19, 0.1)), Distance(lift + 1, lift)]
-    bodies.append(cube(0.15, -0.1))
+    beam = Box((2.0 * HALF, HALF, HALF))  # no cube, for a kernel that other scenes have, too
+    bodies += [
+        cube(0.15, -0.1),
+        Body(beam, density=500.0, position=(-0.6, -0.6, HALF), material=ROUGH),
+    ]
     drives = [
         Drive(Sphere(HALF), 0.2, 20.0, (-0.1, 0.06 * row, 0.03), material=ROUGH) for row in (0, 1)
     ]
@@ -82,9 +87,11 @@ def workshop() -> Scene:
 
 @pytest.fixture(scope="module")
 def with_all_couplings():
-    """All worlds of many bodies get the kernels of `workshop`."""
+    """All worlds of many bodies get the kernels of `workshop`: of its couplings and surfaces."""
+    whole, united = build(workshop(), Fidelity())[1], kinds._united
+    features = {name: True for name, value in whole._asdict().items() if value is True}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kinds, "couplings", lambda scene: couplings(workshop()))
+        patch.setattr(kinds, "_united", lambda *found: united(*found)._replace(**features))
         yield
 
 
@@ -143,7 +150,7 @@ def test_mechanisms_of_the_same_structure_stand_side_by_side():
     chains = found.group[found.group["joint_count"] == found.group["joint_count"].max()]
     assert len(chains) == 1  # all three: their anchors and motors differ, not what they are made of
     assert chains[0]["block_count"] == 3
-    assert found.present.sum() == 36 + 1 - 1 + 3 + 1 + 2 + 1  # two cubes share a spring
+    assert found.present.sum() == 36 + 1 - 1 + 3 + 1 + 1 + 2 + 1  # two cubes share a spring
     many_chains = [cube(x, 0.0, 1.0) for x in range(80)]
     joints = [
         BallJoint(k + 1, k, anchor=(k + 0.5, 0.0, 1.0)) for k in range(0, 80, 2)

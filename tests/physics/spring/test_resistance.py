@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from physics import Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
+from physics import Body, Box, Fidelity, Ground, Material, Scene, Sphere, Static, World
 from physics.reference import closed_forms, scenes
 from physics.reference.scenes import GRAVITY, settled
 
-RADIUS, LENGTH = 0.05, 0.002  # m
+RADIUS, LENGTH, FAR = 0.05, 0.002, 50.0  # m
 TOLERANCE = {"balanced": 3e-3, "accurate": 5e-4, "solid": 5e-4}
 
 
@@ -17,8 +17,11 @@ def ball(angle=0.0, **material):
     """A ball on the ground that resists, at rest."""
     stuff = Material(0.5, 0.0, **material)
     gravity = scenes.tilted_gravity(angle)
-    body = Body(Sphere(RADIUS), mass=0.1, position=(0, 0, RADIUS), material=stuff)
-    return Scene([body], [Ground(stuff)], gravity=gravity)
+    # the other ball and the post are out of reach, so that all springs here share a kernel
+    bodies = [
+        Body(Sphere(RADIUS), mass=0.1, position=(0, y, RADIUS), material=stuff) for y in (0, FAR)
+    ]
+    return Scene(bodies, [Ground(stuff), Static(Sphere(RADIUS), (0, 0, FAR))], gravity=gravity)
 
 
 def roll(world, velocity, spin):
@@ -69,14 +72,15 @@ def test_a_ball_lies_still_on_a_slope_below_c_over_r_and_rolls_above(fidelity):
 
 
 def test_resistance_acts_on_both_bodies_of_a_pair():
-    """Two balls in free space, pressed together by their approach: angular momentum is kept."""
+    """Two balls in free fall, pressed together by their approach: angular momentum is kept."""
     stuff = Material(0.5, 0.0, rolling_resistance=LENGTH, spinning_resistance=LENGTH)
     bodies = [
         Body(Sphere(RADIUS), mass=0.1, position=(0, 0, x), linear_velocity=(0, 0, -10 * x),
              angular_velocity=(3.0, 0.0, 40.0 * x), material=stuff)
         for x in (-0.051, 0.051)
     ]  # fmt: skip
-    world = World(Scene(bodies, gravity=(0, 0, 0)))
+    around = [Ground(height=-FAR), Static(Sphere(RADIUS), (FAR, 0, 0))]  # as in `ball`
+    world = World(Scene(bodies, around))
     momentum, spin = world.angular_momentum(), np.ptp(world.angular_velocity[0, :2, 2])
     world.advance(0.2)
     np.testing.assert_allclose(world.angular_momentum(), momentum, atol=1e-15)
@@ -96,8 +100,15 @@ def test_a_resistance_is_a_length_and_not_negative(name):
 VISCOUS = Fidelity(friction="viscous")
 
 
+def settled_block(time=1.0, **scene):
+    """A cube that has come to rest, with a small kernel: no other test has viscous springs."""
+    world = World(scenes.block_on_ground(**scene), VISCOUS, kernel="special")
+    world.advance(time)
+    return world
+
+
 def test_viscous_friction_is_coulombs_while_the_slip_is_fast():
-    world = settled(scenes.block_on_ground(), VISCOUS)
+    world = settled_block()
     world.set_state(linear_velocity=(2.0, 0.0, 0.0))
     world.advance(0.2)
     expected = 2.0 - 0.5 * GRAVITY * 0.2
@@ -107,7 +118,7 @@ def test_viscous_friction_is_coulombs_while_the_slip_is_fast():
 def test_viscous_friction_creeps_where_coulombs_holds():
     """At m g sin = c v: slow, and so is what a user pays with."""
     angle = math.radians(10.0)
-    world = settled(scenes.block_on_ground(angle=angle), VISCOUS, time=2.0)
+    world = settled_block(2.0, angle=angle)
     damping = float(world._simulation.model.half_pair["shear_damping"][0])
     expected = 0.1 * GRAVITY * math.sin(angle) / damping
     assert world.linear_velocity[0, 0, 0] == pytest.approx(expected, rel=1e-6)
