@@ -45,11 +45,14 @@ def env():
 # --- contract -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+OTHER_PRESETS = [name for name in PRESETS if name != "balanced"]
+
+
 @pytest.mark.parametrize(
-    ("env_id", "fidelity"),
-    [*itertools.product([*IDS, *DENSE_IDS], ["balanced"]),
-     *itertools.product([PUSH, STACK, THROW], [name for name in PRESETS if name != "balanced"])],
+    ("env_id", "fidelity", "render_mode"),
+    [*itertools.product([*IDS, *DENSE_IDS], ["balanced"], [None]),
+     *itertools.product(IDS, ["balanced"], ["rgb_array"]),
+     *itertools.product([PUSH, STACK, THROW], OTHER_PRESETS, [None])],
 )  # fmt: skip
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_accept_every_id_without_a_warning(check, env_id, fidelity, render_mode):
