@@ -180,8 +180,12 @@ def _masked(info):
     return entries
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("names", STACKS, ids="+".join)
+@pytest.mark.parametrize(
+    ("names", "mode"),
+    # one wrapper in one mode, and all in a stack in all modes
+    [(names, mode) for names in STACKS for mode in MODES if len(names) > 1 or mode is MODES[0]],
+    ids=lambda value: "+".join(value) if isinstance(value, tuple) else value.name,
+)
 def test_a_vector_wrapper_returns_what_wrapped_single_environments_return(names, mode):
     """Episodes end at different times, some by success and others by time."""
     kwargs = {"terminate_on_success": True, "reward_type": "dense"}
