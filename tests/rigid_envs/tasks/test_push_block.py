@@ -90,8 +90,8 @@ def test_block_cube_is_bitwise_identical_to_the_default():
         ({"block": U}, 0.98),
     ],
 )
-def test_the_scripted_controller_solves_blocks(options, least):
-    envs = make_vec(300, **options)
+def test_the_scripted_controller_solves_blocks(options, least, stress):
+    envs = make_vec(300 if stress else 128, **options)
     known = {name: options[name] for name in ("block", "obstacles") if name in options}
     controller = functools.partial(push, **known)
     observation, _ = envs.reset(seed=0)

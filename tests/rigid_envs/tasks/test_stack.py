@@ -49,8 +49,7 @@ def test_positions_in_the_goal_have_a_unit_and_released_has_none():
     assert released == ("released", "", 0.0, 1.0)
 
 
-@pytest.mark.parametrize("blocks", BLOCKS)
-@pytest.mark.parametrize("probability", [0.25, 1.0])
+@pytest.mark.parametrize(("blocks", "probability"), [(2, 0.25), (3, 1.0), (5, 0.25)])
 def test_a_fraction_of_episodes_starts_with_a_partial_tower(blocks, probability):
     count = 4000
     envs = make_vec(count, STACK, blocks=blocks, partial_tower_start_prob=probability)
@@ -333,9 +332,9 @@ def test_a_scripted_controller_builds_a_tower_of_three(fidelity, stress):
     assert solved(fidelity, 1000 if stress else worlds, 3).mean() >= 0.9
 
 
-def test_a_scripted_controller_builds_a_tower_of_two_with_noise_on_its_actions():
+def test_a_scripted_controller_builds_a_tower_of_two_with_noise_on_its_actions(stress):
     """Noise of 0.06 moves the hand's reference by 3 mm in each step."""
-    assert solved("balanced", 300, 2, noise=0.06).mean() >= 0.95
+    assert solved("balanced", 300 if stress else 128, 2, noise=0.06).mean() >= 0.95
 
 
 def test_a_scripted_controller_acts_alike_whatever_else_is_observed():
@@ -350,9 +349,9 @@ def test_a_scripted_controller_acts_alike_whatever_else_is_observed():
 
 
 @pytest.mark.parametrize(("fidelity", "size"), [("fast", (0.8, 1.2)), ("balanced", (0.5, 0.65))])
-def test_a_scripted_controller_builds_towers_of_two_of_any_width(fidelity, size):
+def test_a_scripted_controller_builds_towers_of_two_of_any_width(fidelity, size, stress):
     """A top that is not well aligned slides off or tips after it was placed."""
-    assert solved(fidelity, 300, 2, randomize={"size": size}).mean() >= 0.95
+    assert solved(fidelity, 300 if stress else 128, 2, randomize={"size": size}).mean() >= 0.95
 
 
 def solved(
