@@ -74,9 +74,9 @@ POSTS = {"obstacles": 4, "target_yaw": True}
 TASKS = {
     "push": Task(PUSH, 1024, 102, 1000, lowest=lowest_of(CUBE), **RAMMED),
     "push among posts": Task(PUSH, 256, 102, 102, POSTS, lowest_of(CUBE), **RAMMED),
-    "push a T": Task(PUSH, 256, 102, 400, {"block": "t", "obstacles": 2}, lowest_of(T), **RAMMED),
+    "push a T": Task(PUSH, 256, 102, 408, {"block": "t", "obstacles": 2}, lowest_of(T), **RAMMED),
     # the finger stays at its level, so the T stays flat
-    "push_t": Task(PUSH_T, 256, 300, 900, level=0.016),
+    "push_t": Task(PUSH_T, 256, 301, 1204, level=0.016),
     "slide": Task(SLIDE, 256, 204, 400),
     # a hand presses a cube in with 14 N, and pads at 1.6 m/s push it out
     "stack": Task(STACK, 256, 100, 4000, lowest=lowest_of_cubes_and_fingers, kinetic=2.0),

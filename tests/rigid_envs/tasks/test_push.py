@@ -277,7 +277,7 @@ def test_posts_hold_a_cube_that_is_pushed_at_them(fidelity):
         assert clear_of_posts(cube, 4).min() > HALF + POST_RADIUS - pressed_in
 
 
-@pytest.mark.parametrize("options", OPTIONS)
+@pytest.mark.parametrize("options", [*OPTIONS, {"block": "t"}])
 def test_with_options_a_random_policy_hardly_ever_solves_it(options, stress):
     worlds = 1000 if stress else 400
     envs = make_vec(worlds, **options)
