@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from physics import Fidelity, SimulationDiverged
-from rigid_envs import RigidEnv, Runner
+from rigid_envs import RigidEnv, RigidVectorEnv, Runner
 from tests.rigid_envs.rollout import (
     DENSE_IDS,
     EPISODE,
@@ -45,11 +45,14 @@ def env():
 # --- contract -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+OTHER_PRESETS = [name for name in PRESETS if name != "balanced"]
+
+
 @pytest.mark.parametrize(
-    ("env_id", "fidelity"),
-    [*itertools.product([*IDS, *DENSE_IDS], ["balanced"]),
-     *itertools.product([PUSH, STACK, THROW], [name for name in PRESETS if name != "balanced"])],
+    ("env_id", "fidelity", "render_mode"),
+    [*itertools.product([*IDS, *DENSE_IDS], ["balanced"], [None]),
+     *itertools.product(IDS, ["balanced"], ["rgb_array"]),
+     *itertools.product([PUSH, STACK, THROW], OTHER_PRESETS, [None])],
 )  # fmt: skip
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_accept_every_id_without_a_warning(check, env_id, fidelity, render_mode):
@@ -194,22 +197,14 @@ def test_without_a_seed_two_environments_differ():
 
 
 @pytest.mark.parametrize("env_id", IDS)
-def test_a_restored_state_continues_bitwise_identically(env_id):
+def test_a_restored_state_continues_bitwise_identically_here_and_elsewhere(env_id):
     env, actions = in_mid_episode(env_id)
     saved = env.get_state()
+    kept = pickle.loads(pickle.dumps(saved))
     expected = [rollout(env, actions), env.reset(), rollout(env, actions)]
-    env.set_state(saved)
-    assert_same([rollout(env, actions), env.reset(), rollout(env, actions)], expected)
-
-
-@pytest.mark.parametrize("env_id", IDS)
-def test_a_saved_state_outlives_later_steps_and_moves_to_another_environment(env_id):
-    env, actions = in_mid_episode(env_id)
-    saved = pickle.loads(pickle.dumps(env.get_state()))
-    expected = [rollout(env, actions), env.reset(), rollout(env, actions)]
-    other = make(env_id)
-    other.set_state(saved)
-    assert_same([rollout(other, actions), other.reset(), rollout(other, actions)], expected)
+    for one, state in ((env, saved), (make(env_id), kept)):
+        one.set_state(state)
+        assert_same([rollout(one, actions), one.reset(), rollout(one, actions)], expected)
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
@@ -299,9 +294,10 @@ def test_actions_out_of_range_are_clipped(size):
         ({"task": 1}, ValueError, "task must be one of"),
     ],
 )
-def test_an_invalid_argument_raises_an_error_that_names_it(kwargs, error, match):
+@pytest.mark.parametrize("kind", [RigidEnv, RigidVectorEnv])
+def test_an_invalid_argument_raises_an_error_that_names_it(kind, kwargs, error, match):
     with pytest.raises(error, match=match):
-        RigidEnv(**kwargs)
+        kind(**kwargs)
 
 
 def test_a_custom_fidelity_replaces_a_preset():

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from tests.rigid_envs.rollout import (
     IDS,
+    PUSH,
     assert_same,
     make,
     make_vec,
@@ -47,7 +48,9 @@ def threads_have_run():
 @pytest.mark.parametrize(
     "context", [c for c in ("fork", "spawn") if c in multiprocessing.get_all_start_methods()]
 )
-def test_async_vector_env_returns_what_the_native_one_returns(context, env_id):
+def test_async_vector_env_returns_what_the_native_one_returns(context, env_id, stress):
+    if context == "spawn" and env_id != PUSH and not stress:
+        pytest.skip("workers that import the package take 4 s")
     native = make_vec(WORKERS, env_id)
     envs = AsyncVectorEnv(makers(env_id), context=context)
     try:
@@ -82,10 +85,13 @@ def test_many_worlds_run_on_threads_in_a_forked_process(threads_have_run):
         process.join()
 
 
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.parametrize("env_id", IDS)
-def test_subproc_vec_env_returns_what_the_single_one_returns(env_id):
+def test_subproc_vec_env_returns_what_the_single_one_returns(env_id, stress):
     *actions_before, last = actions_of(env_id)[: STEPS[env_id]]
-    envs = SubprocVecEnv(makers(env_id))
+    # forked workers need not import the package, which takes 4 s
+    forked = "fork" in multiprocessing.get_all_start_methods() and env_id != PUSH and not stress
+    envs = SubprocVecEnv(makers(env_id), start_method="fork" if forked else None)
     try:
         envs.seed(7)
         observation = envs.reset()

@@ -233,16 +233,16 @@ def test_a_reset_of_the_other_worlds_leaves_seeded_ones_their_seeds():
 @pytest.mark.parametrize("reward_type", REWARDS)
 def test_the_native_environment_returns_what_gymnasiums_vector_returns(mode, reward_type):
     """Episodes end at different times: some by success, others by their length."""
-    kwargs = {"reward_type": reward_type, "terminate_on_success": True}
+    kwargs = {"reward_type": reward_type, "terminate_on_success": True, "max_episode_steps": 20}
     native = make_vec(4, autoreset_mode=mode, **kwargs)
     vector_kwargs = {"autoreset_mode": mode}
     sync = make_vec(4, vectorization_mode="sync", vector_kwargs=vector_kwargs, **kwargs)
     assert_same(native.reset(seed=8), sync.reset(seed=8))
-    for step, actions in enumerate(random_actions(120, 4)):
-        if step in (20, 61, 75):
-            put_cubes_on_goals(native, np.array([False, True, False, step == 61]))
+    for step, actions in enumerate(random_actions(50, 4)):
+        if step in (8, 26, 33):
+            put_cubes_on_goals(native, np.array([False, True, False, step == 26]))
             put_cubes_on_goals(sync.envs[1].unwrapped)
-            if step == 61:
+            if step == 26:
                 put_cubes_on_goals(sync.envs[3].unwrapped)
         ours, theirs = native.step(actions), sync.step(actions)
         ended = ours[2] | ours[3]

@@ -37,9 +37,10 @@ def test_the_shadow_of_a_sphere_is_the_cylinder_along_the_light(height):
 
 def meets(shape, origin, direction):
     """Whether rays [n, 3] in a shape's frame meet it, by points every 0.4 mm near its centre."""
-    t = -(origin @ direction) + np.linspace(-0.08, 0.08, 400)[:, None]
-    t = t[..., None]
-    x, y, z = np.moveaxis(origin + t * direction, -1, 0)
+    middle = -(origin @ direction)
+    met = np.linalg.norm(origin + middle[:, None] * direction, axis=1) < 0.08  # others pass by
+    t = (middle[met] + np.linspace(-0.08, 0.08, 400)[:, None])[..., None]
+    x, y, z = np.moveaxis(origin[met] + t * direction, -1, 0)
     if isinstance(shape, Sphere):
         inside = x * x + y * y + z * z < shape.radius**2
     elif isinstance(shape, Box):
@@ -53,7 +54,8 @@ def meets(shape, origin, direction):
     else:
         ring = np.hypot(x, y) - shape.major_radius
         inside = ring * ring + z * z < shape.minor_radius**2
-    return inside.any(axis=0)
+    met[met] = inside.any(axis=0)
+    return met
 
 
 SHAPES = [

@@ -81,28 +81,6 @@ def test_block_cube_is_bitwise_identical_to_the_default():
     assert_same(*ends)
 
 
-@pytest.mark.parametrize("fidelity", ["balanced", "solid"])
-def test_blind_steps_stay_physical(fidelity):
-    envs = make_vec(256, block="t", fidelity=fidelity, obstacles=2)
-    envs.reset(seed=0)
-    world = envs._runner.world
-    for observation, *_, info in steps_of(envs, random_actions(100, 256)):
-        inside = ~info["out_of_bounds"]
-        assert all(np.isfinite(values).all() for values in observation.values())
-        assert world.kinetic_energy()[inside].max() < 0.97
-        place, turn = observation["achieved_goal"], observation["observation"][:, 9:13]
-        points = rotate(turn[:, None].astype(float), corners(T)) + place[:, None]
-        assert points[inside, :, 2].min() > -0.01
-
-
-def test_a_random_policy_hardly_ever_solves_it():
-    envs = make_vec(1000, block="t")
-    envs.reset(seed=0)
-    for actions in np.random.default_rng(0).uniform(-1.0, 1.0, (EPISODE, 1000, 3)):
-        info = envs.step(actions)[4]
-    assert info["is_success"].mean() < 0.02
-
-
 @pytest.mark.parametrize(
     ("options", "least"),
     [
@@ -112,8 +90,8 @@ def test_a_random_policy_hardly_ever_solves_it():
         ({"block": U}, 0.98),
     ],
 )
-def test_the_scripted_controller_solves_blocks(options, least):
-    envs = make_vec(300, **options)
+def test_the_scripted_controller_solves_blocks(options, least, stress):
+    envs = make_vec(300 if stress else 128, **options)
     known = {name: options[name] for name in ("block", "obstacles") if name in options}
     controller = functools.partial(push, **known)
     observation, _ = envs.reset(seed=0)

@@ -91,30 +91,8 @@ def test_solved_where_nine_tenths_of_the_goal_are_covered():
     np.testing.assert_array_equal(info["is_success"], uncovered_part(observation) <= UNCOVERED)
 
 
-def test_blind_steps_stay_physical():
-    envs = make_vec(256, PUSH_T)
-    envs.reset(seed=0)
-    world = envs._runner.world
-    for observation, *_, info in steps_of(envs, random_actions(200, 256, size=2)):
-        inside = ~info["out_of_bounds"]
-        assert all(np.isfinite(values).all() for values in observation.values())
-        assert world.position[inside][..., 2].min() > 0.0
-        # the finger stays at its level, so the T stays flat
-        assert np.abs(world.drive_position[..., 2] - 0.016).max() < 2e-3
-
-
-def test_a_random_policy_hardly_ever_solves_it():
-    envs = make_vec(500, PUSH_T)
-    envs.reset(seed=0)
-    solved = np.zeros(500, dtype=bool)
-    actions = np.random.default_rng(0).uniform(-1, 1, (STEPS - 1, 500, 2))
-    for *_, info in steps_of(envs, actions):
-        solved |= info["is_success"]
-    assert solved.mean() < 0.02
-
-
-def test_the_controller_solves_nearly_all_episodes():
-    envs = make_vec(300, PUSH_T)
+def test_the_controller_solves_nearly_all_episodes(stress):
+    envs = make_vec(300 if stress else 128, PUSH_T)
     observation, info = envs.reset(seed=1)
     for _ in range(STEPS - 1):
         observation, *_, info = envs.step(controller_for(PUSH_T)(observation))

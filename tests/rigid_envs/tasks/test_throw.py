@@ -13,7 +13,7 @@ from rigid_envs.tasks.throw import (
     RADIUS,
     Throw,
 )
-from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, random_actions, steps_of
+from tests.rigid_envs.rollout import PRESETS, THROW, make_vec, steps_of
 from training.scripted import controller_for
 
 EPISODE = 50
@@ -92,22 +92,6 @@ def test_aim_is_the_error_of_a_ball_released_now():
     np.testing.assert_allclose(-info["aim"], apart, atol=0.01)
 
 
-@pytest.mark.parametrize("fidelity", PRESETS)
-def test_blind_steps_stay_physical(fidelity, stress):
-    """100,000 random and bang-bang actions, a million with `make stress`."""
-    envs = make_vec(512, THROW, fidelity=fidelity)
-    envs.reset(seed=0)
-    world = envs._runner.world
-    for observation, *_, info in steps_of(
-        envs, random_actions(2000 if stress else 200, 512, size=4)
-    ):
-        inside = ~info["out_of_bounds"]
-        assert all(np.isfinite(values).all() for values in observation.values())
-        # a hand reaches 4 m/s, and squeezes a ball out at no more than as much again
-        assert world.kinetic_energy()[inside].max() < 0.5 * 0.05 * 8.0**2
-        assert world.position[inside][..., 2].min() > 0.0
-
-
 def test_a_ball_that_is_held_without_any_motion_in_the_hand_stays_finite():
     """Its velocity relative to the fingers is exactly zero, and round-off is all that is left."""
     ball = {"mass": 4.7102496147336135, "friction": 6.8884214787092475,
@@ -120,19 +104,9 @@ def test_a_ball_that_is_held_without_any_motion_in_the_hand_stays_finite():
 
 
 @pytest.mark.parametrize("fidelity", PRESETS)
-def test_a_random_policy_hardly_ever_solves_it(fidelity):
-    envs = make_vec(500, THROW, fidelity=fidelity)
-    envs.reset(seed=0)
-    solved = np.zeros(500, dtype=bool)
-    for *_, info in steps_of(envs, np.random.default_rng(0).uniform(-1, 1, (EPISODE, 500, 4))):
-        solved |= info["is_success"]
-    assert solved.mean() < 0.02
-
-
-@pytest.mark.parametrize("fidelity", PRESETS)
 def test_a_scripted_controller_hits(fidelity, stress):
-    """1,000 seeds; 200 at accurate, except with `make stress`."""
-    worlds = 200 if fidelity == "accurate" and not stress else 1000
+    """1,000 seeds; 400 at fast and balanced and 128 else, except with `make stress`."""
+    worlds = 1000 if stress else 400 if fidelity in ("fast", "balanced") else 128
     envs = make_vec(worlds, THROW, fidelity=fidelity)
     observation, _ = envs.reset(seed=0)
     for _ in range(EPISODE):

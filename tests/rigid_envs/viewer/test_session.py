@@ -109,7 +109,7 @@ def test_a_paused_session_steps_only_one_by_one():
         ("throw", "balanced"),
     ],
 )
-def test_another_fidelity_keeps_positions_and_velocities(task, fidelity):
+def test_another_fidelity_keeps_positions_and_velocities(task, fidelity, stress):
     session = make(task)
     run(session, 6)
     before, spin = state(session), session.runner.world.angular_velocity.copy()
@@ -118,6 +118,8 @@ def test_another_fidelity_keeps_positions_and_velocities(task, fidelity):
     np.testing.assert_allclose(state(session), before, atol=1e-12)
     np.testing.assert_allclose(session.runner.world.angular_velocity, spin, atol=1e-12)
     np.testing.assert_array_equal(session.runner.world.time, times)
+    if fidelity == "solid" and not stress:
+        return  # a step would compile a kernel that no other test has, for 12 s
     run(session, 6)
     assert session.steps == 12
     assert np.isfinite(state(session)).all()

@@ -283,12 +283,12 @@ class Recording:
 
 
 @cache
-def record(name: str, reward_type: str, terminate: bool) -> Recording:
+def record(name: str, terminate: bool) -> Recording:
     """Plays the first episode of each world; all policies start from the same seeds."""
     case = CASES[name]
     count = case.worlds * len(case.policies)
-    options = {**case.options, "reward_type": reward_type, "terminate_on_success": terminate}
-    envs = make_vec(count, case.env_id, **options)
+    options = {**case.options, "terminate_on_success": terminate}
+    envs = make_vec(count, case.env_id, reward_type="dense", **options)
     seeds = list(range(SEED, SEED + case.worlds)) * len(case.policies)
     start = envs.reset(seed=seeds)
     actions, steps, observation = [], [], start[0]
@@ -312,10 +312,10 @@ def worlds_of(case: Case, policy: str) -> slice:
 
 
 class Playback(VectorEnv):
-    """Returns the recorded steps again, so that wrappers see them as those of an environment."""
+    """Returns the recorded steps again, with the rewards of an environment, to its wrappers."""
 
-    def __init__(self, recording: Recording) -> None:
-        envs = self._envs = recording.envs
+    def __init__(self, recording: Recording, envs: VectorEnv) -> None:
+        self._envs = envs
         self.num_envs, self.metadata, self.reward = envs.num_envs, envs.metadata, envs.reward
         self.observation_space, self.action_space = envs.observation_space, envs.action_space
         self.single_observation_space = envs.single_observation_space
@@ -327,20 +327,22 @@ class Playback(VectorEnv):
         return self._recording.start
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
-        recorded, step = next(self._steps)
+        recorded, (observation, _, *ends, info) = next(self._steps)
         assert actions is recorded
-        return step
+        goals = observation["achieved_goal"], observation["desired_goal"]
+        return observation, self.compute_reward(*goals, info), *ends, info
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Any:
         return self._envs.compute_reward(achieved, desired, info)
 
 
 def dense(name: str, terminate: bool) -> Any:
-    return Playback(record(name, "dense", terminate))
+    return Playback(recording := record(name, terminate), recording.envs)
 
 
 def sparse(name: str, terminate: bool) -> Any:
-    return Playback(record(name, "sparse", terminate))
+    recording, case = record(name, terminate), CASES[name]
+    return Playback(recording, make_vec(recording.envs.num_envs, case.env_id, **case.options))
 
 
 def staged(name: str, terminate: bool) -> Any:
@@ -401,7 +403,7 @@ def test_idlers_do_not_solve_the_task(name):
 
 def last_step(name: str, idler: str) -> tuple[dict[str, Array], Array]:
     """Info after the last step of an idler's episodes, and the positions [step, world, 3]."""
-    recording, worlds = record(name, "sparse", False), worlds_of(CASES[name], idler)
+    recording, worlds = record(name, False), worlds_of(CASES[name], idler)
     results = [recording.start, *recording.steps]
     info = {key: values[worlds] for key, values in results[-1][-1].items()}
     return info, np.array([result[0]["achieved_goal"][worlds, :3] for result in results])

@@ -35,6 +35,12 @@ def finished(tmp_path_factory) -> Callable[[TrainConfig], Path]:
 
 
 @pytest.fixture
+def without_images(monkeypatch) -> None:
+    """Results are recorded without a plot and a video, which take longest."""
+    monkeypatch.setattr("training.results.results._update_images", lambda *_: None)
+
+
+@pytest.fixture
 def runs(tmp_path, quick_ppo, finished) -> Path:
     """A folder with two finished runs, with the seeds 3 and 4."""
     for number, seed in ((1, 3), (2, 4)):

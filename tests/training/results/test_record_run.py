@@ -118,6 +118,7 @@ def enlarge(run: RunFolder) -> None:
         (lambda run: change(run.path / "run.json", seed=5), "seed is 5, but config.yaml has 3"),
     ],
 )
+@pytest.mark.usefixtures("without_images")
 def test_runs_that_cannot_be_recorded_are_skipped_with_a_reason(
     repository, runs, damage, complaint
 ):

@@ -14,12 +14,16 @@ from training.settings.seed_ranges import EVALUATION
 from training.settings.tasks import task_name
 
 
-def test_shipped_policies_are_small_and_as_good_as_recorded():
+def test_shipped_policies_are_small_and_as_good_as_recorded(stress):
+    """Of the policies of a task and an algorithm one is played, with `make stress` all are."""
+    played = set()
     for result in read_results(SOURCE):
         file = result.folder(SOURCE) / "policy.safetensors"
         assert file.stat().st_size <= 300_000
-        outcome = evaluate(read_policy(file), 100, seed=EVALUATION, quiet=True)
-        assert outcome.success_at_end.mean() >= result.success_at_end["low"] - 0.1
+        if stress or result.kind not in played:
+            played.add(result.kind)
+            outcome = evaluate(read_policy(file), 100, seed=EVALUATION, quiet=True)
+            assert outcome.success_at_end.mean() >= result.success_at_end["low"] - 0.1, file
 
 
 def test_other_arguments_make_another_table(repository, runs, quick_ppo):
@@ -84,6 +88,7 @@ def test_dense_id_is_the_same_task():
         ({"versions": "new"}, "versions is 'new'"),
     ],
 )
+@pytest.mark.usefixtures("without_images")
 def test_invalid_fields_are_named(repository, runs, changes, complaint):
     update(repository, runs / "ppo" / "Test-Reach-v0_1")
     file = repository / PLACE / "result.json"

@@ -29,7 +29,7 @@ def config(tmp_path, monkeypatch):
         env_id=REACH, n_envs=8, n_timesteps=2000, batch_size=64, buffer_size=5000,
         learning_starts=0, train_freq=4, eval_freq=0, seed=1, env_kwargs={"fidelity": "fast"},
         policy=SYMLOG_POLICY, policy_kwargs={"net_arch": [32, 32]}, demonstrations=NAME,
-        cloning_steps=1500, learning_rate="lin_1e-4",
+        cloning_steps=800, learning_rate="lin_1e-4",
     )  # fmt: skip
 
 
@@ -58,7 +58,7 @@ def test_the_actor_is_fitted_to_what_was_intended(config):
 
 def test_cloning_needs_demonstrations(config):
     with (
-        pytest.raises(UsageError, match=r"cloning_steps is 1500, which requires demonstrations"),
+        pytest.raises(UsageError, match=r"cloning_steps is 800, which requires demonstrations"),
         worlds_and_model(config.replace(demonstrations=None), "cpu", 1),
     ):
         pass
@@ -80,7 +80,9 @@ def test_settings_that_cloning_contradicts_raise(config, values, message):
 
 
 def test_the_critic_learns_the_return_and_the_actor_climbs_it(config):
-    config = config.replace(gamma=0.5, tau=0.05, learning_rate=1e-3, cloning_weight=0.0)
+    config = config.replace(
+        gamma=0.5, tau=0.05, learning_rate=1e-3, cloning_weight=0.0, cloning_steps=10
+    )
     with worlds_and_model(config, "cpu", 1) as (worlds, model):
         model.learn(64)  # to set up the logger; clones
         buffer, observation = model.replay_buffer, worlds.reset()
