@@ -8,7 +8,7 @@ from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
 from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_pose
-from physics.collision.surface_kinds import by_surface_kind
+from physics.collision.surface_kinds import by_surface_kind, present_kinds
 from physics.compiler.jit import LANES, at, stage
 from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
@@ -18,43 +18,17 @@ from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
 
 
 @cached_by_features
-def make_prepare(features, kind):
-    """Stage that writes the rows of a half-pair against one kind of surface."""
-    friction, resistance = features.friction, features.resistance
-    box, compound = kind == BOX, features.compound
-    has_faces = kind in (BOX, CYLINDER)
-    touch = make_touch(features, kind)
-    memory_rows = contact_memory(features)
-    NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
-    SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
+def make_find_points(features, kind):
+    """Stage that writes arms and normals in the frame of a surface of one kind."""
+    hides, has_faces = kind == BOX and features.compound, kind in (BOX, CYLINDER)
+    touch, FACE = make_touch(features, kind), contact_memory(features).face
 
     @stage
-    def prepare(
-        slots,
-        candidate,
-        relative,
-        owner,
-        surface,
-        frame,
-        A,
-        B,
-        constants,
-        updates_memory,
-        h,
-        points,
-    ):
-        """Writes rows with the impulses of the last step as the first guess.
-
-        `frame` describes the surface; remembered vectors are in the frame of its solid. `h` is the
-        time in s over which the impulses of a step act.
-        """
+    def find_points(slots, candidate, relative, constants, updates_memory, points):
         R, c = relative.rotation, relative.position
-        G = frame.rotation if compound else surface.rotation
-        Q, a, b = surface.rotation, owner.position, surface.position
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
         overlap_share = constants.overlap_share
-        face_normals, pair_mass = constants.face_normals != 0, constants.pair_mass
-        axial = constants.axial != 0
+        face_normals, axial = constants.face_normals != 0, constants.axial != 0
         for n in range(slots):
             row, point = candidate[n], points[n]
             memory = row.memory
@@ -66,16 +40,52 @@ def make_prepare(features, kind):
                     row, i, R, c, ca, cb, cc, radius, owner_radius, share, face_normals, axial
                 )
                 weight = row.weight[i]
-                if box and compound:
+                if hides:
                     weight = 0.0 if face == HIDDEN else weight
+                if has_faces:
+                    face = face if weight > 0.0 else 0.0
+                    memory[FACE, i] = face if updates_memory[i] != 0 else memory[FACE, i]
+                point.normal[0, i] = nx
+                point.normal[1, i] = ny
+                point.normal[2, i] = nz
+                point.arm[0, i] = x
+                point.arm[1, i] = y
+                point.arm[2, i] = z
+                point.separation[i] = -penetration
+                point.weight[i] = weight
+
+    return find_points
+
+
+@cached_by_features
+def make_prepare(features):
+    """Stage that writes the rows of a half-pair whose points `find_points` has found."""
+    friction, resistance, compound = features.friction, features.resistance, features.compound
+    memory_rows = contact_memory(features)
+    NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
+    SHEAR, TWIST = memory_rows.shear, memory_rows.twist
+
+    @stage
+    def prepare(slots, candidate, owner, surface, frame, A, B, constants, h, points):
+        """Writes rows with the impulses of the last step as the first guess.
+
+        `frame` describes the surface; remembered vectors are in the frame of its solid. `h` is the
+        time in s over which the impulses of a step act.
+        """
+        G = frame.rotation if compound else surface.rotation
+        Q, a, b = surface.rotation, owner.position, surface.position
+        pair_mass = constants.pair_mass
+        for n in range(slots):
+            row, point = candidate[n], points[n]
+            memory = row.memory
+            for i in range(LANES):
+                x, y, z = point.arm[0, i], point.arm[1, i], point.arm[2, i]
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 ax, ay, az = rotated(G, i, x, y, z)
                 nx, ny, nz = rotated(G, i, nx, ny, nz)
                 bx = ax + (a[0, i] - b[0, i])
                 by = ay + (a[1, i] - b[1, i])
                 bz = az + (a[2, i] - b[2, i])
-                if has_faces:
-                    face = face if weight > 0.0 else 0.0
-                    memory[FACE, i] = face if updates_memory[i] != 0 else memory[FACE, i]
                 point.normal[0, i] = nx
                 point.normal[1, i] = ny
                 point.normal[2, i] = nz
@@ -85,8 +95,6 @@ def make_prepare(features, kind):
                 point.surface_arm[0, i] = bx
                 point.surface_arm[1, i] = by
                 point.surface_arm[2, i] = bz
-                point.separation[i] = -penetration
-                point.weight[i] = weight
                 normal_impulse = h * memory[NORMAL, i]
                 point.normal_impulse[i] = normal_impulse
                 point.normal_impact[i] = 0.0
@@ -137,21 +145,12 @@ def make_prepare(features, kind):
 @cached_by_features
 def make_contact_rows(features):
     """Stage that writes the contact rows of a half-pair."""
-    of_kind = by_surface_kind(features, lambda kind: make_contact_rows_of_kind(features, kind))
-
-    @stage
-    def contact_rows(model, state, workspace, g, k, updates_memory, h):
-        of_kind(model.half_pair[k].kind, model, state, workspace, g, k, updates_memory, h)
-
-    return contact_rows
-
-
-@cached_by_features
-def make_contact_rows_of_kind(features, kind):
-    """The same, for half-pairs whose surface is of one kind."""
-    plane, box, compound = kind == PLANE, kind == BOX, features.compound
-    grid = kind == GRID
-    prepare = make_prepare(features, kind)
+    kinds, compound = present_kinds(features), features.compound
+    on_plane = make_points_of_kind(features, PLANE) if PLANE in kinds else None
+    on_solid = by_surface_kind(
+        features, lambda kind: None if kind == PLANE else make_points_of_kind(features, kind)
+    )
+    has_plane, has_solids, prepare = PLANE in kinds, kinds != [PLANE], make_prepare(features)
 
     @stage
     def contact_rows(model, state, workspace, g, k, updates_memory, h):
@@ -166,26 +165,33 @@ def make_contact_rows_of_kind(features, kind):
         candidate = state.candidate[g, first : first + slots]
         first = workspace.half_pair[k].first_row
         points = workspace.contact_row[first : first + slots]
-        relative = owner if plane else workspace.relative[0]
-        if not plane:
+        # a plane is in the world frame, as the owner is
+        if has_plane and (not has_solids or constants.kind == PLANE):
+            on_plane(model, k, slots, candidate, owner, constants, updates_memory, points)
+        if has_solids and (not has_plane or constants.kind != PLANE):
+            relative = workspace.relative[0]
             relative_pose(owner, frame, relative)
-        if compound and box:
+            on_solid(
+                constants.kind, model, k, slots, candidate, relative, constants, updates_memory,
+                points,
+            )  # fmt: skip
+        prepare(slots, candidate, owner, surface, frame, A, B, constants, h, points)
+
+    return contact_rows
+
+
+@cached_by_features
+def make_points_of_kind(features, kind):
+    """Stage that finds the points of half-pairs whose surface is of one kind."""
+    hides, grid = kind == BOX and features.compound, kind == GRID
+    find_points = make_find_points(features, kind)
+
+    @stage
+    def points_of_kind(model, k, slots, candidate, relative, constants, updates_memory, points):
+        if hides:
             mark_hidden_faces(model, k, candidate, relative)
         if grid:
             grid_distances(model, k, candidate, relative)
-        prepare(
-            slots,
-            candidate,
-            relative,
-            owner,
-            surface,
-            frame,
-            A,
-            B,
-            constants,
-            updates_memory,
-            h,
-            points,
-        )
+        find_points(slots, candidate, relative, constants, updates_memory, points)
 
-    return contact_rows
+    return points_of_kind

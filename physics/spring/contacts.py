@@ -9,7 +9,7 @@ import math
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_gravity, relative_pose, relative_velocities
-from physics.collision.surface_kinds import by_surface_kind
+from physics.collision.surface_kinds import by_surface_kind, present_kinds
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
@@ -35,43 +35,78 @@ def make_half_pair(features, report):
 
     `rows`: one `contact_loop.REPORT` for each slot of all half-pairs, written if `report`; else ().
     """
-    of_kind = by_surface_kind(features, lambda kind: make_half_pair_of_kind(features, kind, report))
+    kinds = present_kinds(features)
+    on_plane, on_solid = make_on_plane(features, report), make_on_solid(features, report)
+    has_plane, has_solids = PLANE in kinds, kinds != [PLANE]
 
     @sequence
     def half_pair(model, state, workspace, rows, g, k, h):
-        of_kind(model.half_pair[k].kind, model, state, workspace, rows, g, k, h)
+        if has_plane and (not has_solids or model.half_pair[k].kind == PLANE):
+            on_plane(model, state, workspace, rows, g, k, h)
+        if has_solids and (not has_plane or model.half_pair[k].kind != PLANE):
+            on_solid(model, state, workspace, rows, g, k, h)
 
     return half_pair
 
 
 @cached_by_features
-def make_half_pair_of_kind(features, kind, report):
-    """The same, for half-pairs whose surface is of one kind."""
-    plane, box, compound = kind == PLANE, kind == BOX, features.compound
-    slope, grid = features.slope, kind == GRID
+def make_on_plane(features, report):
+    """The same, for half-pairs whose surface is a plane.
+
+    A plane is in the world frame, as the owner is: the loop reads the owner itself and adds the
+    forces straight to it; a plane never moves, so it gets none.
+    """
+    begin_half_pair, loop = make_begin_half_pair(features), make_loop(features, PLANE, report)
+
+    @sequence
+    def on_plane(model, state, workspace, rows, g, k, h):
+        owner = workspace.solid[model.half_pair[k].owner]
+        begin_half_pair(model, workspace, k, h, owner)
+        loop(model, state, workspace, rows, g, k, h, owner)
+
+    return on_plane
+
+
+@cached_by_features
+def make_on_solid(features, report):
+    """The same, for half-pairs whose surface is that of a solid."""
+    compound, slope = features.compound, features.slope
     begin_half_pair = make_begin_half_pair(features)
+    loops = by_surface_kind(
+        features, lambda kind: None if kind == PLANE else make_loop(features, kind, report)
+    )
+
+    @sequence
+    def on_solid(model, state, workspace, rows, g, k, h):
+        constants, relative = model.half_pair[k], workspace.relative[0]
+        owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
+        # of a compound `frame` is the part that is touched, `surface` the whole that forces act on
+        frame = workspace.solid[constants.frame] if compound else surface
+        begin_half_pair(model, workspace, k, h, relative)
+        relative_pose(owner, frame, relative)
+        relative_velocities(owner, frame, relative)
+        if slope:
+            relative_gravity(frame, constants.gravity, relative)
+        loops(constants.kind, model, state, workspace, rows, g, k, h, relative)
+        add_wrenches(owner, surface, frame, relative)
+
+    return on_solid
+
+
+@cached_by_features
+def make_loop(features, kind, report):
+    """Sequence that adds the forces of a half-pair's candidates to the sums in `relative`."""
+    box, grid, compound = kind == BOX, kind == GRID, features.compound
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
     save_memory, restore_memory = make_keep_memory(features)
 
     @sequence
-    def half_pair(model, state, workspace, rows, g, k, h):
+    def loop(model, state, workspace, rows, g, k, h, relative):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
-        owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
-        # of a compound `frame` is the part that is touched, `surface` the whole that forces act on
-        frame = workspace.solid[constants.frame] if compound else surface
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
-        # a plane is in the world frame, as the owner is: the loop reads the owner itself and adds
-        # the forces straight to it; a plane never moves, so it gets none
-        relative = owner if plane else workspace.relative[0]
-        begin_half_pair(model, workspace, k, h, relative)
-        if not plane:
-            relative_pose(owner, frame, relative)
-            relative_velocities(owner, frame, relative)
-            if slope:
-                relative_gravity(frame, constants.gravity, relative)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
         if grid:
@@ -89,10 +124,8 @@ def make_half_pair_of_kind(features, kind, report):
         contact_loop(slots, candidate, relative, constants, h, out)
         if keeps:
             restore_memory(candidate, slots, saved, lane.active, h)
-        if not plane:
-            add_wrenches(owner, surface, frame, relative)
 
-    return half_pair
+    return loop
 
 
 @cached_by_features
