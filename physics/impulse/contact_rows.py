@@ -4,6 +4,8 @@ The rows of all half-pairs are prepared before the sweeps, because an impulse at
 the velocities at the others. (The spring law needs a contact point only once.)
 """
 
+from typing import Any
+
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
 from physics.collision.grid_distance import grid_distances
@@ -146,7 +148,7 @@ def make_prepare(features):
 def make_contact_rows(features):
     """Stage that writes the contact rows of a half-pair."""
     kinds, compound = present_kinds(features), features.compound
-    on_plane = make_points_of_kind(features, PLANE) if PLANE in kinds else None
+    on_plane: Any = make_points_of_kind(features, PLANE) if PLANE in kinds else None
     on_solid = by_surface_kind(
         features, lambda kind: None if kind == PLANE else make_points_of_kind(features, kind)
     )
