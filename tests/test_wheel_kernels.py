@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from physics.compiler import code_cache
-from physics.compiler.levels import offered
+from physics.compiler.files import code_cache
+from physics.compiler.files.levels import offered
 
 pytestmark = [
     pytest.mark.packaging,
@@ -84,7 +84,7 @@ def test_who_installs_it_compiles_nothing(wheel, tmp_path):
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    versions = "from physics.compiler.code_cache import versions; print(versions())"
+    versions = "from physics.compiler.files.code_cache import versions; print(versions())"
     needed = code_cache.versions()
     if run(versions).strip() != needed:  # newer ones than those that compiled the kernels
         assert f"the kernels of this wheel need {needed}, found" in run(STEPS)

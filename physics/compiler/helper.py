@@ -24,7 +24,7 @@ from typing import Any
 
 from numba.core import typeinfer
 
-from physics.compiler.claims import can_claim, claimed, is_claimed
+from physics.compiler.files.claims import can_claim, claimed, is_claimed
 
 _START = "import sys; sys.path[:] = {path!r}; from physics.compiler.helper import main; main()"
 

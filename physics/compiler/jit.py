@@ -27,10 +27,10 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
 from physics.compiler import helper, linking
-from physics.compiler.claims import claimed
-from physics.compiler.code_cache import report_unused_kernels
+from physics.compiler.files.claims import claimed
+from physics.compiler.files.code_cache import report_unused_kernels
+from physics.compiler.files.kernel_files import KernelFiles
 from physics.compiler.interrupts import interrupts_kept
-from physics.compiler.kernel_files import KernelFiles
 from physics.compiler.linking import EntryPipeline, SequencePipeline, StagePipeline
 from physics.compiler.views import View
 

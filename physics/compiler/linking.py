@@ -44,11 +44,11 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from physics.compiler.claims import claimed
-from physics.compiler.code_cache import CodeFile
 from physics.compiler.counting import UseCounters
+from physics.compiler.files.claims import claimed
+from physics.compiler.files.code_cache import CodeFile
+from physics.compiler.files.identity import NoIdentityError
 from physics.compiler.fusion import fuse_products
-from physics.compiler.identity import NoIdentityError
 from physics.compiler.interrupts import interrupts_deferred, raise_lost_interrupt
 from physics.compiler.resolution import RememberingContext
 

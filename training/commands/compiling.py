@@ -15,8 +15,8 @@ import gymnasium as gym
 import numpy as np
 
 import rigid_envs  # noqa: F401  (registers the ids)
-from physics.compiler.code_cache import NOTE, folders, versions
-from physics.compiler.levels import LEVELS, offered
+from physics.compiler.files.code_cache import NOTE, folders, versions
+from physics.compiler.files.levels import LEVELS, offered
 from physics.reference.general import GENERAL_KERNELS, compile_general
 from physics.scene.fidelity import PRESETS
 from rigid_envs.registration import ENVIRONMENTS
@@ -78,7 +78,7 @@ def run_for(
     """Compiles in a process of its own, for a level of processors, and copies kernels to a folder.
 
     Args:
-        level: one of `physics.compiler.levels.LEVELS`; this processor if None.
+        level: one of `physics.compiler.files.levels.LEVELS`; this processor if None.
         into: folder for the kernels, made if needed; the cache of this machine if None.
         ids: see `run`.
         presets: see `run`.

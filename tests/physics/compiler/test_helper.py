@@ -7,13 +7,14 @@ import time
 
 import pytest
 
-from physics.compiler import claims, helper
+from physics.compiler import helper
+from physics.compiler.files import claims
 from tests.physics.compiler.test_code_cache import FALL, PACKAGE, files, run
 
 # keeps a claim until its input ends
 HOLD = """
 import sys
-from physics.compiler.claims import claimed
+from physics.compiler.files.claims import claimed
 with claimed(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.compiler.identity import NoIdentityError, identify
+from physics.compiler.files.identity import NoIdentityError, identify
 
 FACTOR = 2.0
 TABLE = np.arange(3.0)
@@ -69,7 +69,7 @@ def test_values_in_the_closure_count():
     ],
 )
 def test_what_a_function_can_reach_counts(function, name, other, monkeypatch):
-    from physics.compiler import identity
+    from physics.compiler.files import identity
 
     before = digest(function)
     monkeypatch.setattr(identity, "_known", {})
@@ -83,7 +83,7 @@ def test_what_a_function_can_reach_counts(function, name, other, monkeypatch):
 
 
 def test_what_a_function_cannot_reach_does_not_count(monkeypatch):
-    from physics.compiler import identity
+    from physics.compiler.files import identity
 
     before = digest(makes_pairs)
     monkeypatch.setattr(identity, "_known", {})

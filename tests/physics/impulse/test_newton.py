@@ -127,10 +127,11 @@ def test_a_world_does_not_depend_on_its_neighbours_or_on_threads():
         np.testing.assert_array_equal(alone.linear_velocity[0], together.linear_velocity[n])
 
 
-def test_a_tower_with_masses_of_its_own_stands_alike():
+def test_a_tower_with_masses_of_its_own_stands_alike(stress):
     """Masses as parameters of each world give what the same masses in the scene give."""
-    # no other test has a kernel for this, and the special one is the smaller
-    world = World(scenes.tower(5), LONG, 2, per_world_parameters=True, kernel="special")
+    if not stress:
+        pytest.skip("a kernel of its own for ten seconds; see make stress")
+    world = World(scenes.tower(5), LONG, 2, per_world_parameters=True)
     heavier = np.array([[MASS] * 5, [MASS, MASS, MASS, MASS, 10 * MASS]])
     world.set_parameters(mass=heavier)
     world.advance(2.0)

@@ -51,7 +51,7 @@ def test_positions_in_the_goal_have_a_unit_and_released_has_none():
 
 @pytest.mark.parametrize(("blocks", "probability"), [(2, 0.25), (3, 1.0), (5, 0.25)])
 def test_a_fraction_of_episodes_starts_with_a_partial_tower(blocks, probability):
-    count = 4000
+    count = 1500
     envs = make_vec(count, STACK, blocks=blocks, partial_tower_start_prob=probability)
     observation, info = envs.reset(seed=0)
     cubes, tower = (cubes_of(observation[key]) for key in ("achieved_goal", "desired_goal"))

@@ -26,19 +26,19 @@ import numba
 import numpy as np
 from numba.misc.appdirs import AppDirs
 
-from physics.compiler.identity import hash_files, identify
-from physics.compiler.levels import LEVELS, offered
+from physics.compiler.files.identity import hash_files, identify
+from physics.compiler.files.levels import LEVELS, offered
 
 LOGGER = logging.getLogger("physics")
 
-_PACKAGE = Path(__file__).parents[1]
+_PACKAGE = Path(__file__).parents[2]
 
 # settings of numba, by environment variables, that change the code
 _SETTINGS = (
     "OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "USING_SVML",
 )  # fmt: skip
 _MADE_BY = repr((
-    hash_files(Path(__file__).parent), numba.__version__, llvmlite.__version__,
+    hash_files(Path(__file__).parents[1]), numba.__version__, llvmlite.__version__,
     np.__version__.split(".")[0], sys.version_info[:2], sys.implementation.cache_tag,
     [getattr(numba.config, name, None) for name in _SETTINGS],
 )).encode()  # fmt: skip

@@ -125,8 +125,8 @@ def _is_compilers(value: Any) -> bool:
 
 
 def hash_files(folder: Path) -> str:
-    """A hash of all Python files in a folder."""
+    """A hash of all Python files in a folder and those within it."""
     whole = hashlib.sha256()
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(folder.rglob("*.py")):
         whole.update(path.name.encode() + path.read_bytes())
     return whole.hexdigest()

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from physics.compiler.code_cache import folders
+from physics.compiler.files.code_cache import folders
 
 fcntl: Any
 try:

@@ -10,8 +10,8 @@ from typing import Any
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 
-from physics.compiler.code_cache import CodeFile, folders
-from physics.compiler.identity import NoIdentityError
+from physics.compiler.files.code_cache import CodeFile, folders
+from physics.compiler.files.identity import NoIdentityError
 
 
 class KernelFiles(_Cache):
