@@ -51,7 +51,9 @@ def processes() -> int:
 
 
 def start(recipe: Recipe, types: Any, digest: str) -> None:
-    """Starts a helper that compiles stages of an entry, unless one is at work or isn't allowed.
+    """Starts a helper that compiles stages of an entry, unless there is one or none is allowed.
+
+    A process has one helper at a time.
 
     Args:
         recipe: of the entry.
@@ -59,24 +61,25 @@ def start(recipe: Recipe, types: Any, digest: str) -> None:
         digest: of the entry's code.
     """
     claim = hashlib.sha256(f"helper of {digest}".encode()).hexdigest()
-    if claim not in _started and can_claim() and not is_claimed(claim):
+    busy = any(process.poll() is None for process in _helpers)
+    if processes() > 1 and can_claim() and not (busy or claim in _started or is_claimed(claim)):
         _started.add(claim)
         _start(claim, [(recipe, types)])
 
 
 def start_whole(entries: Sequence[tuple[Recipe, Any]]) -> None:
-    """Starts a helper that compiles whole entries, one after the other, likewise.
+    """Starts a helper that compiles whole entries, one after the other; it replaces one at work.
 
     Args:
         entries: recipe of each, and types of its arguments.
     """
-    if can_claim():
+    if processes() > 1 and can_claim():
+        for process in _helpers:
+            _end(process)
         _start(None, entries)
 
 
 def _start(claim: str | None, entries: Sequence[tuple[Recipe, Any]]) -> None:
-    if processes() < 2 or any(process.poll() is None for process in _helpers):
-        return
     command = [sys.executable, "-c", _START.format(path=sys.path)]
     with suppress(OSError, TypeError, pickle.PicklingError):  # without a helper it takes longer
         job = pickle.dumps((claim, entries))
@@ -105,8 +108,10 @@ def main() -> None:
         entry = getattr(importlib.import_module(module), name)(*arguments)
         with suppress(Exception):
             if claim is None:
-                if not is_claimed(entry.file(types).digest):
-                    entry.load_types(types)
+                file = entry.file(types)
+                if file is None or file.exists() or is_claimed(file.digest):
+                    return  # the other process has come so far
+                entry.load_types(types)
                 continue
             typeinfer.ConstraintNetwork.propagate = _propagate_backwards  # type: ignore[method-assign]
             with claimed(claim):

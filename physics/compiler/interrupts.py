@@ -24,19 +24,27 @@ def interrupts_kept() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
         return
+    within = True
 
     def handle(*arguments: Any) -> None:
         try:
             before(*arguments)
         except BaseException as error:
-            _raised.append(error)
+            if within:
+                _raised.append(error)
             raise
 
-    signal.signal(signal.SIGINT, handle)
+    _raised.clear()
     try:
-        yield
+        signal.signal(signal.SIGINT, handle)
+        try:
+            yield
+        except Exception:
+            raise_lost_interrupt()  # which may be why
+            raise
         raise_lost_interrupt()
     finally:
+        within = False
         signal.signal(signal.SIGINT, before)
         _raised.clear()
 
@@ -60,5 +68,5 @@ def interrupts_deferred() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if seen:
-        before(*seen[0])
+        if seen:
+            before(*seen[0])

@@ -80,9 +80,9 @@ def _at(value: Any, i: Any) -> Any:
     return lambda value, i: value
 
 
-# Held while an entry is compiled and called for the first time, so that a compilation is logged
-# once. A fork takes it first, then numba's lock, as a compilation does: a child process would wait
-# for a thread that it lacks. What is registered last is called first before a fork
+# Held while an entry is compiled or read, so that a compilation is logged once. A fork takes it
+# first, then numba's lock, as a compilation does: a child process would wait for a thread that it
+# lacks. What is registered last is called first before a fork
 _first_call = threading.RLock()
 if hasattr(os, "register_at_fork"):  # Windows has no fork
     for _lock in (global_compiler_lock, _first_call):
@@ -208,7 +208,7 @@ def factory(make: Any) -> Any:
 
 @contextmanager
 def _without_garbage_collection() -> Iterator[None]:
-    """During the first call of an entry, which compiles it.
+    """While an entry is compiled.
 
     Numba makes millions of objects that live until the end; searching them took 7 % of the time.
     """

@@ -305,9 +305,10 @@ class StagePipeline(EntryPipeline):
         described.argtypes, signature = self.state.args, signature.replace(args=self.state.args)
         library = _restored.get(digest)
         if library is None:  # a symbol must not be linked twice
-            library = _restored[digest] = self.library(context.codegen(), name)
+            library = self.library(context.codegen(), name)
             library._final_module = llvm.parse_bitcode(bitcode)
             library._finalize_final_module()
+            _restored[digest] = library  # once it is whole: Ctrl-C may come before
         function = context.get_executable(library, described, Environment.from_fndesc(described))
         context.insert_user_function(function, described, [library])
         return compile_result(

@@ -4,8 +4,6 @@ The rows of all half-pairs are prepared before the sweeps, because an impulse at
 the velocities at the others. (The spring law needs a contact point only once.)
 """
 
-from typing import Any
-
 from physics.collision.compound_frames import mark_hidden_faces
 from physics.collision.contact_point import HIDDEN, make_touch
 from physics.collision.grid_distance import grid_distances
@@ -21,7 +19,10 @@ from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
 
 @cached_by_features
 def make_find_points(features, kind):
-    """Stage that writes arms and normals in the frame of a surface of one kind."""
+    """Stage that writes arms, normals, separations and weights, in the frame of the surface.
+
+    The surface is of one kind; candidates remember the face of it that they touch.
+    """
     hides, has_faces = kind == BOX and features.compound, kind in (BOX, CYLINDER)
     touch, FACE = make_touch(features, kind), contact_memory(features).face
 
@@ -148,11 +149,12 @@ def make_prepare(features):
 def make_contact_rows(features):
     """Stage that writes the contact rows of a half-pair."""
     kinds, compound = present_kinds(features), features.compound
-    on_plane: Any = make_points_of_kind(features, PLANE) if PLANE in kinds else None
+    on_plane = make_points_of_kind(features, PLANE)
     on_solid = by_surface_kind(
         features, lambda kind: None if kind == PLANE else make_points_of_kind(features, kind)
     )
-    has_plane, has_solids, prepare = PLANE in kinds, kinds != [PLANE], make_prepare(features)
+    has_plane, has_solids = PLANE in kinds, any(kind != PLANE for kind in kinds)
+    prepare = make_prepare(features)
 
     @stage
     def contact_rows(model, state, workspace, g, k, updates_memory, h):

@@ -37,7 +37,7 @@ def make_half_pair(features, report):
     """
     kinds = present_kinds(features)
     on_plane, on_solid = make_on_plane(features, report), make_on_solid(features, report)
-    has_plane, has_solids = PLANE in kinds, kinds != [PLANE]
+    has_plane, has_solids = PLANE in kinds, any(kind != PLANE for kind in kinds)
 
     @sequence
     def half_pair(model, state, workspace, rows, g, k, h):

@@ -7,7 +7,6 @@ one takes seconds to compile.
 
 import os
 from collections.abc import Iterable
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -85,19 +84,13 @@ def prepare(features: Features, base: Model, fidelity: Fidelity) -> None:
         advance.prepare(*_arguments(features, base, fidelity))
 
 
-def load_kernels(kernel: str, scene: Scene, fidelities: Iterable[Fidelity], count: int) -> None:
-    """Makes sure that the kernels of `count` worlds of a scene at several fidelities are compiled.
-
-    A fidelity that the scene refuses is left out.
-    """
+def load_kernels(kernels: Iterable[tuple[Features, Model, Fidelity]]) -> None:
+    """Makes sure that kernels are compiled, for features, the scene's model and its fidelity."""
     calls: dict[int, tuple[Any, tuple[Any, ...]]] = {}
-    for fidelity in fidelities:
-        with suppress(ValueError):
-            base, needed = build(scene, fidelity, False)
-            features = choose(kernel, needed, base, fidelity, count)
-            advance = find_advance(features, fidelity)
-            if id(advance) not in calls:
-                calls[id(advance)] = advance, _arguments(features, base, fidelity)
+    for features, base, fidelity in kernels:
+        advance = find_advance(features, fidelity)
+        if id(advance) not in calls:
+            calls[id(advance)] = advance, _arguments(features, base, fidelity)
     load_all(list(calls.values()))
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from time import perf_counter
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from physics.errors import SimulationDiverged
 from physics.manybody.simulation import MANY
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
-from physics.step.kernel_choice import requested
+from physics.step.kernel_choice import load_kernels, requested
 from physics.world import World
 
 Array = np.ndarray
@@ -113,8 +114,7 @@ def simulate(
         Exception: whatever `start` or `control` raise.
     """
     try:
-        kernel = requested(None, "special")  # as in training: its cost is what counts
-        world = World(course.scene, fidelity, course.worlds, threads=1, kernel=kernel)
+        world = _world(course, fidelity)
     except ValueError as error:
         return Simulated(None, note=str(error))
     try:
@@ -134,6 +134,20 @@ def simulate(
     return Simulated(motion, max(shortest - called, _LEAST * shortest) / course.simulated)
 
 
+def _world(course: Course, fidelity: Fidelity) -> World:
+    kernel = requested(None, "special")  # as in training: its cost is what counts
+    return World(course.scene, fidelity, course.worlds, threads=1, kernel=kernel)
+
+
+def compile_for(course: Course, fidelities: Iterable[Fidelity]) -> None:
+    """Makes sure that the kernels are compiled; a fidelity that the scene refuses needs none."""
+    simulations = []
+    for fidelity in fidelities:
+        with suppress(ValueError):
+            simulations.append(_world(course, fidelity)._simulation)
+    load_kernels((s.features, s.base, s.fidelity) for s in simulations)
+
+
 def begin(course: Course, fidelities: Iterable[Fidelity]) -> None:
     """Calls `start` and `control` once, so that their errors come before anything is compiled.
 
@@ -146,14 +160,15 @@ def begin(course: Course, fidelities: Iterable[Fidelity]) -> None:
     """
     for fidelity in fidelities:
         try:
-            world = World(course.scene, fidelity, course.worlds, threads=1)
+            world = _world(course, fidelity)
         except ValueError:
             continue
-        if course.start is not None:
-            course.start(world)
-        if course.control is not None:
-            course.control(world, 0)
-        return
+        with suppress(SimulationDiverged):  # at this fidelity
+            if course.start is not None:
+                course.start(world)
+            if course.control is not None:
+                course.control(world, 0)
+            return
 
 
 def _call_time(world: World, course: Course) -> float:

@@ -9,11 +9,19 @@ from physics.manybody.simulation import MANY
 from physics.scene.fidelity import LAWS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.validation import choice, instance, integer, positive
-from physics.step.kernel_choice import load_kernels, requested
 from physics.tuning.candidates import families, safe_speed
 from physics.tuning.description import code
 from physics.tuning.metrics import METRICS, Metric
-from physics.tuning.motion import FRAME, Control, Course, Start, begin, side_by_side, simulate
+from physics.tuning.motion import (
+    FRAME,
+    Control,
+    Course,
+    Start,
+    begin,
+    compile_for,
+    side_by_side,
+    simulate,
+)
 from physics.tuning.reference import CONVERGED, Reference, find_reference
 
 _BUDGET = 15.0  # s of wall time for the reference
@@ -148,7 +156,8 @@ def tune(
         time: s that are simulated, in frames of 40 ms.
         law: contact law of the reference; None: springs if a material gives a stiffness, else
             impulses.
-        start: called with the World before the first frame, sets states.
+        start: called with each World before its first frame, and once before anything is compiled;
+            sets states.
         control: called with the World and the frame's index before every frame, moves drives.
         worlds: number of worlds simulated side by side; None: 16, or 1 of many bodies.
         exhaustive: try all fidelities, also those that can't be the cheapest.
@@ -168,11 +177,11 @@ def tune(
     count = integer("worlds", side_by_side(scene) if worlds is None else worlds, low=1)
     course = Course(scene, frames, FRAME, count, start, control)
     say = progress or (lambda _: None)
-    begin(course, (family.members[-1] for family in families(scene)))
+    members = [family.members[-1] for family in families(scene)]
+    begin(course, members)
     if len(scene.bodies) < MANY:
         say("kernels: those that this scene has not had before are compiled")
-        members = (family.members[-1] for family in families(scene))
-        load_kernels(requested(None, "special"), scene, members, count)
+        compile_for(course, members)
     measure = METRICS[name]
     reference = Reference(None, 0.0, "none is needed", time)
     if measure.needs_reference:

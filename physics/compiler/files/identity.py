@@ -3,8 +3,8 @@
 Compiled code is kept on disk, so an edit must change the name of its file. The identity of a
 function covers its own code, the values in its closure, the globals that it names, and so on
 through every function among them. So an edit compiles again what can reach it, and nothing else;
-comments don't count. What numba's own functions do is covered by its version, and what this
-package does by a hash of its files (see `code_cache`).
+comments and docstrings don't count. What numba's own functions do is covered by its version, and
+what the compiler package does by a hash of its files (see `code_cache`).
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 _OWN = ("physics", "rigid_envs")  # packages whose modules are followed
-_COMPILER = __name__.rpartition(".")[0]
+_COMPILER = "physics.compiler"
 
 
 class NoIdentityError(TypeError):
@@ -75,7 +75,7 @@ def _code(code: CodeType, function: Any, names: set[str]) -> Any:
         _code(c, function, names) if isinstance(c, CodeType) else repr(c) for c in code.co_consts
     ]
     if code is function.__code__ and function.__doc__ and code.co_consts[0] == function.__doc__:
-        del constants[0]  # the documentation
+        constants[0] = "documentation"
     names.update(code.co_names)
     known = function.__globals__
     name = function.__module__, function.__qualname__
@@ -128,5 +128,5 @@ def hash_files(folder: Path) -> str:
     """A hash of all Python files in a folder and those within it."""
     whole = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
-        whole.update(path.name.encode() + path.read_bytes())
+        whole.update(str(path.relative_to(folder)).encode() + path.read_bytes())
     return whole.hexdigest()

@@ -61,6 +61,34 @@ def test_with_a_helper_the_results_are_the_same(tmp_path):
     assert files(tmp_path / "together").keys() == files(tmp_path / "alone").keys()
 
 
+# kernels of two integrators; the third fidelity is refused
+INTEGRATORS = """
+from physics import Body, Fidelity, PointSpring, Scene, Sphere, World
+from physics.tuning.motion import Course, compile_for
+scene = Scene([Body(Sphere(0.1), mass=1.0)], fields=[PointSpring(0, 1.0)])
+chosen = [Fidelity(), Fidelity(integrator="euler"), Fidelity(substep=100.0, integrator="rk4")]
+compile_for(Course(scene, 1, 0.04, 2), chosen)
+for fidelity in chosen[:2]:
+    world = World(scene, fidelity, kernel="special")
+    world.advance(0.1)
+    print(world.position[0, 0, 2])
+"""
+
+
+def test_with_a_helper_for_whole_kernels_the_results_are_the_same(tmp_path):
+    kept = []
+    for number in ("1", "2"):
+        cache = tmp_path / number
+        printed, log = run(
+            cache, INTEGRATORS, RIGID_ENVS_COMPILERS=number, RIGID_ENVS_KERNEL="special"
+        )
+        assert "Traceback" not in log
+        assert log.count("compiling kernel 'advance'") <= 2
+        kept.append((printed, {name for name in files(cache) if name.startswith("advance.")}))
+    assert kept[0] == kept[1]
+    assert len(kept[0][1]) == 2
+
+
 def test_a_helper_ends_with_the_process_that_started_it(cache):
     """Killed while it compiles: nothing is left behind, and the next process works."""
     process = start(FALL, cache)

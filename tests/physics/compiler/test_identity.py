@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from physics.compiler.atomics import wait_for_all
 from physics.compiler.files.identity import NoIdentityError, identify
 
 FACTOR = 2.0
@@ -48,8 +49,17 @@ def again(n):
     return again(n - 1) if n > 0 else 0
 
 
+def waits(counter):
+    wait_for_all(counter, 1)
+
+
 def uses_names():
     return len(NAMES)
+
+
+def test_what_this_package_makes_has_an_identity():
+    """Its files are a part of every key."""
+    assert digest(waits) == digest(waits)
 
 
 def test_values_in_the_closure_count():

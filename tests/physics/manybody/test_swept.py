@@ -177,7 +177,7 @@ def collide(spins, steps):
             place = np.zeros(3)
             place[axis] = 0.15 * side
             walls.append(Static(Box(tuple(half)), position=tuple(place), material=material))
-    world = made(Scene(bodies, walls, gravity=(0, 0, 0)))
+    world = made(Scene(bodies, walls, gravity=(0, 0, 0)), threads=2)
     energy = world.kinetic_energy()[0]
     for _ in range(steps):
         world.advance(STEP)

@@ -119,16 +119,18 @@ def played(name, fidelity, stress) -> Seen:
     solved = np.zeros(worlds, dtype=bool)
     steps = task.stress_steps if stress else task.steps
     actions = random_actions(steps, worlds, size=envs.single_action_space.shape[0])
+    # np.minimum and np.maximum keep what is not a number
     for observation, _, terminated, truncated, info in steps_of(envs, actions):
         inside = ~info["out_of_bounds"]
         seen.finite &= all(np.isfinite(values).all() for values in observation.values())
-        seen.lowest = min(seen.lowest, task.lowest(world, observation)[inside].min())
+        seen.lowest = np.minimum(seen.lowest, task.lowest(world, observation)[inside].min())
         kinetic = world.kinetic_energy()
-        seen.kinetic = max(seen.kinetic, kinetic[inside].max())
-        seen.energy = max(seen.energy, (kinetic + world.potential_energy())[inside].max())
-        seen.furthest = max(seen.furthest, np.abs(world.position[inside]).max())
+        seen.kinetic = np.maximum(seen.kinetic, kinetic[inside].max())
+        seen.energy = np.maximum(seen.energy, (kinetic + world.potential_energy())[inside].max())
+        seen.furthest = np.maximum(seen.furthest, np.abs(world.position[inside]).max())
         heights = world.drive_position[..., 2]
-        seen.levels = min(seen.levels[0], heights.min()), max(seen.levels[1], heights.max())
+        low, high = seen.levels
+        seen.levels = np.minimum(low, heights.min()), np.maximum(high, heights.max())
         solved = info["is_success"] | (solved & (not task.at_end))
         ended = terminated | truncated
         seen.episodes += ended[::2].sum()
