@@ -1,8 +1,8 @@
 """Ctrl-C during a compilation: it ends the compilation, and none is lost.
 
 A handler of SIGINT raises an exception wherever Python happens to be. In a finalizer or in a
-callback from LLVM, which a compilation runs by the thousand, Python reports the exception and goes
-on. So the exception is kept, and raised again before the next function is compiled.
+callback from LLVM, which a compilation runs by the thousand, Python only reports the exception. So
+it is kept, and raised again before the next function is compiled.
 """
 
 import signal

@@ -292,29 +292,24 @@ def _hidden_by(p, x, y, z, points, slabs, sun, spread, way):
     if p.kind == BOX:
         return _hidden_by_box(p, ox, oy, oz, len(points), slabs, aside)
     least, found = _CLOSE * p.reach, 0
-    # before the sun's points its middle, the primitive grown, then shrunk; in one loop, so that
-    # `intersection` is compiled in once
-    first = -2 if (spread > 0.0) & (p.kind != TRIANGLE) else 0
-    for s in range(first, len(points)):
-        a, b, c = p.size[0], p.size[1], p.size[2]
-        if s < 0:
-            ex, ey, ez = turned_into(p, sun[0], sun[1], sun[2])
-            x, y, z = ox, oy, oz
-            if s == -2:
-                a, b, c = grown(p.kind, a, b, c, aside)
-            else:
-                a, b, c = shrunk(p.kind, a, b, c, aside)
-                if (p.kind == TORUS) | (a <= 0.0):
-                    continue
-        else:
-            ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
-            x, y, z = ox + least * ex, oy + least * ey, oz + least * ez
-        at, _, _, _ = intersection(p.kind, a, b, c, x, y, z, ex, ey, ez)
-        if s >= 0:
-            found |= (1 << s) if at < math.inf else 0
-        elif s == -2:
-            if at == math.inf:
-                return found
-        elif at < math.inf:
-            return (1 << len(points)) - 1
+    if (spread > 0.0) & (p.kind != TRIANGLE):
+        ex, ey, ez = turned_into(p, sun[0], sun[1], sun[2])
+        a, b, c = grown(p.kind, p.size[0], p.size[1], p.size[2], aside)
+        at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
+        if at == math.inf:
+            return found
+        if p.kind != TORUS:
+            a, b, c = shrunk(p.kind, p.size[0], p.size[1], p.size[2], aside)
+            if a > 0.0:
+                at, _, _, _ = intersection(p.kind, a, b, c, ox, oy, oz, ex, ey, ez)
+                if at < math.inf:
+                    return (1 << len(points)) - 1
+    for s in range(len(points)):
+        ex, ey, ez = turned_into(p, points[s, 0], points[s, 1], points[s, 2])
+        at, _, _, _ = intersection(
+            p.kind, p.size[0], p.size[1], p.size[2],
+            ox + least * ex, oy + least * ey, oz + least * ez, ex, ey, ez,
+        )  # fmt: skip
+        if at < math.inf:
+            found |= 1 << s
     return found
