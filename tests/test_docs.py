@@ -29,8 +29,6 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
         "families",
         lambda scene: [one for one in families(scene) if one.name in ("springs", "impulses")],
     )
-    if page.name == "time-control.md":  # no other test has its general kernel
-        monkeypatch.setenv("RIGID_ENVS_KERNEL", "special")
     known = set(gym.registry)
     code = "\n".join(BLOCK.findall(page.read_text()))
     code = code.replace("learn(1_000_000)", "learn(51_200)")  # a round: enough to see that it runs

@@ -78,15 +78,6 @@ def copied(used, tmp_path):
     return tmp_path / "all", tmp_path / "all" / "cache", result
 
 
-def test_a_second_process_compiles_nothing(tmp_path):
-    (misses, height), _ = run(tmp_path, FALL)
-    assert misses == 1.0
-    before = files(tmp_path)
-    assert len(before) > 10
-    assert run(tmp_path, FALL) == ([0.0, height], "")
-    assert files(tmp_path) == before
-
-
 def test_damaged_files_are_compiled_again(copied):
     """One is empty, one has lost its end, one is of another program."""
     root, cache, result = copied

@@ -1,4 +1,4 @@
-"""Compilations are announced; without numba the stages are plain Python."""
+"""Only the compiler knows numba; without it the stages are plain Python."""
 
 import contextlib
 import io
@@ -14,18 +14,6 @@ import physics
 
 PACKAGE = Path(physics.__file__).parent
 ROOT = PACKAGE.parent
-
-# reports that reach the log, however many threads ask for a kernel
-FALL = """
-import logging
-from physics import Body, Scene, Sphere, World
-lines = []
-logging.getLogger("physics").addFilter(lambda record: lines.append(record.getMessage()))
-world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2, kernel="special")
-world.advance(1.0)
-print(sum(line.startswith("compiling kernel 'advance'") for line in lines))
-print(sum(line.startswith("compiled kernel 'advance' in") for line in lines))
-"""
 
 PUSH = """
 from physics import World
@@ -57,11 +45,6 @@ def run(program, cache, root=ROOT, **variables):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return [float(x) for x in done.stdout.split()]
-
-
-def test_a_compilation_is_announced_once(tmp_path):
-    assert run(FALL, tmp_path) == [1, 1]
-    assert run(FALL, tmp_path) == [0, 0]
 
 
 def test_only_the_compiler_knows_numba():
