@@ -60,7 +60,7 @@ test: $(TESTS)
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m "not packaging"
 
 package: $(TESTS)
-	$(BIN)/python -m pytest -q -m packaging
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m packaging
 
 # With kernels for every level of processors that this one has.
 wheel: $(TESTS)
@@ -82,11 +82,11 @@ ray: $(RAY_STAMP)
 # The oldest numba, NumPy, Gymnasium and threadpoolctl that pyproject.toml allows.
 $(OLD_STAMP): pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv/oldest
-	$(OLD_BIN)/python -m pip install --quiet -c constraints-oldest.txt -e . pytest hypothesis scipy
+	$(OLD_BIN)/python -m pip install --quiet -c constraints-oldest.txt -e . pytest pytest-xdist hypothesis scipy
 	@touch $@
 
 oldest: $(OLD_STAMP)
-	$(OLD_BIN)/python -m pytest -q tests/physics/compiler tests/physics/step/test_kernel_choice.py
+	$(OLD_BIN)/python -m pytest -q -n 2 tests/physics/compiler tests/physics/step/test_kernel_choice.py
 
 stress: $(TESTS)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress $(if $(PART),--part $(PART))

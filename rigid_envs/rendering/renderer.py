@@ -17,7 +17,7 @@ from physics.step.threads import run_in_blocks
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.markers import Overlay, overlay, stacked
 from rigid_envs.rendering.primitives import balls, placed, shape_primitives
-from rigid_envs.rendering.rays.kernel import make_draw
+from rigid_envs.rendering.rays.kernel import Drawn, Memory, Pictures, make_draw
 from rigid_envs.rendering.rays.light import SUN_FRAME, TO_SUN, sun_points
 from rigid_envs.rendering.rays.shadows import MOST_CELLS
 from rigid_envs.rendering.rays.tables import PRIMITIVE
@@ -171,13 +171,15 @@ class Renderer:
         tiles, tile_depth = self._ground
         kernel = make_draw()
         order = np.argsort(-(solids["position"] @ TO_SUN), axis=1, kind="stable")
+        drawn = Drawn(
+            solids, order, glass, decals, polygons, self._view, SUN_FRAME, self._points, tiles,
+            tile_depth,
+        )  # fmt: skip
+        pictures = Pictures(colors, depths, indices)
 
         def run(first: int, last: int) -> int:
-            kernel(
-                first, last, solids, order, glass, decals, polygons, self._view, SUN_FRAME,
-                self._points, tiles, tile_depth, self.smooth,
-                *self._working_memory(solids.shape[1]), colors, depths, indices, ground_solid,
-            )  # fmt: skip
+            memory = self._working_memory(solids.shape[1])
+            kernel(first, last, drawn, memory, pictures, self.smooth, ground_solid)
             return 0
 
         run_in_blocks(run, worlds, self.threads)
@@ -203,7 +205,7 @@ class Renderer:
             np.maximum(field, least, out=field)
         return np.concatenate([solids, grains], axis=1), faint
 
-    def _working_memory(self, count: int) -> tuple[Array, ...]:
+    def _working_memory(self, count: int) -> Memory:
         """Of this thread, for `count` primitives."""
         memory, size, listed = self._memory, (self.height, self.width), LISTED * count + 64
         if not hasattr(memory, "pixels"):
@@ -217,7 +219,7 @@ class Renderer:
         if len(memory.entries) < listed:
             memory.entries = np.empty(listed, np.int32)
             memory.slabs = np.empty((count, len(self._points) + 1, 6))
-        return *memory.pixels, memory.entries, memory.slabs, memory.spans
+        return Memory(*memory.pixels, memory.entries, memory.slabs, memory.spans)
 
 
 def _opaque(item: Item) -> bool:
