@@ -92,6 +92,7 @@ class Renderer:
         self._points = sun_points(SOFT if soft else 1)
         self._view = self.camera.table(self.width, self.height, self._below[2])
         self._memory = threading.local()
+        self._has_ground = False
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Settings only."""
@@ -100,13 +101,17 @@ class Renderer:
 
     @cached_property
     def _ground(self) -> tuple[Array, Array]:
-        """Colours and depths of the empty ground."""
-        size, camera = (self.height, self.width), self.camera
-        picture, depth = np.empty((*size, 3), np.uint8), np.empty(size)
+        """Colours and depths of the empty ground, which `_draw_ground` writes."""
+        size = self.height, self.width
+        return np.empty((*size, 3), np.uint8), np.empty(size)
+
+    def _draw_ground(self) -> None:
+        picture, depth = self._ground
+        camera = self.camera
         shown = camera.distance * np.tan(0.5 * np.radians(camera.field_of_view))
         target = np.array(camera.target[:2])
         make_draw_ground()(self._view, target, shown, self.floor is not None, picture, depth)
-        return picture, depth
+        self._has_ground = True
 
     def frame(
         self, items: Sequence[Item], *, markers: Sequence[Marker] = (), forces: Sequence[Arrow] = ()
@@ -168,14 +173,18 @@ class Renderer:
         colors = np.empty((worlds if rgb else 0, *size, 3), np.uint8)
         depths = np.empty((worlds if depth else 0, *size), np.float32)
         indices = np.empty((worlds if solid else 0, *size), np.int32)
-        tiles, tile_depth = self._ground
         kernel = make_draw()
         order = np.argsort(-(solids["position"] @ TO_SUN), axis=1, kind="stable")
         drawn = Drawn(
-            solids, order, glass, decals, polygons, self._view, SUN_FRAME, self._points, tiles,
-            tile_depth,
+            solids, order, glass, decals, polygons, self._view, SUN_FRAME, self._points,
+            *self._ground,
         )  # fmt: skip
         pictures = Pictures(colors, depths, indices)
+        if not self._has_ground:
+            # so that another process compiles while this one draws the ground
+            memory = self._working_memory(solids.shape[1])
+            kernel.prepare(0, worlds, drawn, memory, pictures, self.smooth, ground_solid)
+            self._draw_ground()
 
         def run(first: int, last: int) -> int:
             memory = self._working_memory(solids.shape[1])
@@ -207,19 +216,19 @@ class Renderer:
 
     def _working_memory(self, count: int) -> Memory:
         """Of this thread, for `count` primitives."""
-        memory, size, listed = self._memory, (self.height, self.width), LISTED * count + 64
-        if not hasattr(memory, "pixels"):
-            memory.pixels = (
+        own, size, listed = self._memory, (self.height, self.width), LISTED * count + 64
+        if not hasattr(own, "tables"):
+            own.tables = Memory(
                 np.empty(size), np.empty(size, np.int32), np.empty(size, np.uint8),
                 np.empty((*size, 3), np.uint8), np.empty((9, 2), np.int64),
-                np.empty(MOST_CELLS**2 + 1, np.int32),
+                starts=np.empty(MOST_CELLS**2 + 1, np.int32), entries=np.empty(0, np.int32),
+                slabs=np.empty((0, 0, 6)), spans=np.empty((self.height, 2), np.int64),
             )  # fmt: skip
-            memory.spans = np.empty((self.height, 2), np.int64)
-            memory.entries = np.empty(0, np.int32)
+        memory: Memory = own.tables
         if len(memory.entries) < listed:
-            memory.entries = np.empty(listed, np.int32)
-            memory.slabs = np.empty((count, len(self._points) + 1, 6))
-        return Memory(*memory.pixels, memory.entries, memory.slabs, memory.spans)
+            entries, slabs = np.empty(listed, np.int32), np.empty((count, len(self._points) + 1, 6))
+            own.tables = memory = memory._replace(entries=entries, slabs=slabs)
+        return memory
 
 
 def _opaque(item: Item) -> bool:

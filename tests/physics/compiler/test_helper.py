@@ -85,9 +85,7 @@ for fidelity in chosen[:2]:
 
 
 def test_a_helper_for_whole_kernels_compiles_what_this_process_does_not(tmp_path):
-    printed, log = run(
-        tmp_path, INTEGRATORS, RIGID_ENVS_COMPILERS="2", RIGID_ENVS_KERNEL="special"
-    )
+    printed, log = run(tmp_path, INTEGRATORS, RIGID_ENVS_COMPILERS="2", RIGID_ENVS_KERNEL="special")
     assert "Traceback" not in log
     assert log.count("compiling kernel 'advance'") <= 2
     assert sum(name.startswith("advance.") for name in files(tmp_path)) == 2

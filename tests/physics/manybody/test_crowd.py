@@ -47,10 +47,10 @@ def state_of(world):
 
 @pytest.mark.parametrize("law", ["balanced", "solid"])
 def test_a_heap_is_that_of_all_pairs_and_bitwise_the_same_for_1_2_and_4_threads(law, stress):
-    worlds = [World(heap(40), law, threads=n) for n in (1, 2, 4)]
+    worlds = [World(heap(34), law, threads=n) for n in (1, 2, 4)]
     assert all(isinstance(world._simulation, many.CrowdSimulation) for world in worlds)
     assert state_of(worlds[0]) == state_of(worlds[1])
-    all_pairs = Simulation(heap(40), worlds[0].fidelity, 1, 1, False, kernel="general")
+    all_pairs = Simulation(heap(34), worlds[0].fidelity, 1, 1, False, kernel="general")
     apart = []
     for _ in range(20 if stress else 12):  # they meet in the fourth
         for world in worlds:
@@ -208,8 +208,8 @@ def test_a_wrench_lifts_one_cube():
 
 
 def test_the_largest_stable_step_is_that_of_all_pairs():
-    world = World(heap(40), "balanced")
-    all_pairs = Simulation(heap(40), world.fidelity, 1, 1, False, kernel="general")
+    world = World(heap(34), "balanced")
+    all_pairs = Simulation(heap(34), world.fidelity, 1, 1, False, kernel="general")
     world.advance(0.1)
     all_pairs.advance(0.1, all_pairs.everyone)
     expected = LaneQueries(all_pairs).largest_stable_step(0)

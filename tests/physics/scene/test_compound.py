@@ -40,8 +40,8 @@ def test_a_t_has_the_mass_properties_of_its_boxes():
 def test_a_lattice_of_particles_agrees_on_a_compound_of_turned_parts():
     turn = tuple(from_rotation_vector(np.array([0.4, 0.0, 0.0])))
     shape = Compound([(Box((0.05, 0.02, 0.02)), (0, 0, 0), turn), (Sphere(0.03), (0.08, 0, 0))])
-    cell = 0.24 / 161
-    axis = cell * (np.arange(161) - 80.0)
+    cell = 0.24 / 141
+    axis = cell * (np.arange(141) - 70.0)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     inside = points[np.min([part.distance(points) for part in shape.parts], axis=0) < 0.0]
     assert len(inside) * cell**3 == pytest.approx(shape.volume, rel=0.01)
