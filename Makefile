@@ -80,13 +80,13 @@ ray: $(RAY_STAMP)
 	RAY_USAGE_STATS_ENABLED=0 $(RAY_BIN)/python -m pytest -q tests/training/cluster
 
 # The oldest numba, NumPy, Gymnasium and threadpoolctl that pyproject.toml allows.
-$(OLD_STAMP): pyproject.toml constraints-oldest.txt
+$(OLD_STAMP): pyproject.toml constraints-oldest.txt Makefile
 	$(PYTHON) -m venv .venv/oldest
 	$(OLD_BIN)/python -m pip install --quiet -c constraints-oldest.txt -e . pytest pytest-xdist hypothesis scipy
 	@touch $@
 
 oldest: $(OLD_STAMP)
-	$(OLD_BIN)/python -m pytest -q -n 2 tests/physics/compiler tests/physics/step/test_kernel_choice.py
+	$(OLD_BIN)/python -m pytest -q -n 2 --dist loadfile tests/physics/compiler tests/physics/step/test_kernel_choice.py
 
 stress: $(TESTS)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress $(if $(PART),--part $(PART))

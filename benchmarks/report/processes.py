@@ -70,9 +70,14 @@ def run_in_tree(command: Command, tree: Path) -> None:
 
 
 def run_code(
-    code: str, *arguments: str, variables: Mapping[str, str] | None = None
+    code: str, *arguments: str, variables: Mapping[str, str | None] | None = None
 ) -> tuple[float, str]:
     """Runs Python code in a fresh interpreter.
+
+    Args:
+        code: the program.
+        arguments: its arguments.
+        variables: of the environment, beside those of this process; None removes one.
 
     Returns:
         Its duration in s, interpreter and imports included, and what it printed.
@@ -80,11 +85,12 @@ def run_code(
     Raises:
         subprocess.CalledProcessError: The code failed.
     """
+    changed = {**os.environ, **(variables or {})}
     start = perf_counter()
     run = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=ROOT,
-        env={**os.environ, **(variables or {})},
+        env={name: value for name, value in changed.items() if value is not None},
         stdout=subprocess.PIPE,
         text=True,
         check=True,

@@ -1,4 +1,4 @@
-"""Bundles: the arrays of a model, a state or a workspace, passed to a stage as one pointer.
+"""Bundles: named tuples of arrays, such as a model or a state, passed to a stage as one pointer.
 
 Numba passes a named tuple of arrays as all of their parts: data, shape, strides and others, seven
 or more for each array. With thirty arrays the instructions that take these apart and put them

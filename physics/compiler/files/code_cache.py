@@ -24,6 +24,7 @@ from uuid import uuid4
 import llvmlite
 import numba
 import numpy as np
+from numba.core.types import NamedTuple, NamedUniTuple
 from numba.misc.appdirs import AppDirs
 
 from physics.compiler.files.identity import hash_files, identify
@@ -66,6 +67,14 @@ def folders() -> list[Path]:
     return [users] if installed else [_PACKAGE / "__pycache__" / "kernels", users]
 
 
+def _seen(kind: Any, names: frozenset[str]) -> Any:
+    """What the code of a function that reads these names depends on, of the type of an argument."""
+    if hasattr(kind, "seen_by"):  # of a bundle not how the rest is laid out
+        return kind.seen_by(names)
+    # numba's name of a named tuple has the types of its fields and not what they are called
+    return (kind.fields, kind) if isinstance(kind, NamedTuple | NamedUniTuple) else kind
+
+
 class CodeFile:
     """The file of a function that is compiled for given types of arguments.
 
@@ -82,9 +91,7 @@ class CodeFile:
             NoIdentityError: the function can reach a value whose identity isn't known.
         """
         identity = identify(function)
-        # of a bundle only what the function can read: it ignores how the rest is laid out
-        seen = [x.seen_by(identity.names) if hasattr(x, "seen_by") else x for x in types]
-        own = identity.digest, seen
+        own = identity.digest, [_seen(kind, identity.names) for kind in types]
         name = function.__name__.strip("<>")
 
         def digest_for(target: Any) -> str:

@@ -6,8 +6,11 @@ import os
 import shutil
 import subprocess
 import sys
+from collections import namedtuple
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 import physics
@@ -33,7 +36,7 @@ print(sum(stats.cache_misses.values()), out[5])
 FALL = """
 from physics import Body, Scene, Sphere, World
 from physics.step.time_layers import make_advance
-world = World(Scene([Body(Sphere(0.1))]), count=32, threads=2, kernel="special")
+world = World(Scene([Body(Sphere(0.1))]), count=144, threads=2, kernel="special")
 world.advance(1.0)
 compiled = make_advance(world.features).compiled
 print(sum(compiled.stats.cache_misses.values()), world.position[0, 0, 2])
@@ -146,6 +149,21 @@ def test_a_file_is_read_by_what_made_it_only(tmp_path, monkeypatch):
     path.rename(tmp_path / file().name)  # as if it had been made by these
     monkeypatch.setattr(code_cache.pickle, "loads", pytest.fail)  # not even looked at
     assert file().load() is None
+
+
+def test_the_order_of_a_named_tuple_s_fields_counts():
+    """Whose types may be the same: an old kernel would take one array for the other."""
+    column = numba.typeof(np.zeros(3))
+    digests = {
+        code_cache.CodeFile(
+            files,
+            (numba.types.NamedUniTuple(column, 2, namedtuple("Memory", names)),),
+            "",
+            "kernel",
+        ).digest
+        for names in ("near far", "far near", "near far")
+    }
+    assert len(digests) == 2
 
 
 def test_processes_that_compile_the_same_kernel_at_once_agree(used, tmp_path):

@@ -1,4 +1,4 @@
-"""Only the compiler knows numba; without it the stages are plain Python."""
+"""Only the compiler knows numba; without numba the stages are plain Python."""
 
 import contextlib
 import io
