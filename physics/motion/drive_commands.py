@@ -12,8 +12,13 @@ Array = np.ndarray
 
 
 def worlds_last(values: Array) -> Array:
-    """Values [count, drives, 3] as an array [drives, 3, count]; copied only if needed."""
-    return np.ascontiguousarray(values.transpose(1, 2, 0))
+    """Values [count, drives, 3] as an array [drives, 3, count]; copied only if needed.
+
+    Always one that may be written: numba compiles a kernel of its own for those that may not, such
+    as a value that was broadcast.
+    """
+    turned = np.ascontiguousarray(values.transpose(1, 2, 0))
+    return turned if turned.flags.writeable else turned.copy()
 
 
 @cache

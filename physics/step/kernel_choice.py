@@ -51,8 +51,8 @@ def requested(kernel: str | None, default: str = "auto") -> str:
 def choose(kernel: str, needed: Features, base: Model, fidelity: Fidelity, count: int) -> Features:
     """The features of the kernel for `count` worlds: `needed`, or more.
 
-    "auto" takes what is compiled already, a special kernel rather than a general one. If neither
-    is, it compiles the general kernel, or the special one for many worlds.
+    "auto" takes the special kernel for many worlds; for fewer, the special one if it has been
+    compiled, else the general one.
     """
     more = general(needed)
     if kernel == "special" or more is None:

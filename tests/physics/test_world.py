@@ -24,6 +24,7 @@ from physics import (
 from physics.compiler.jit import LANES
 from physics.model.contact_memory import contact_memory
 from physics.model.features import GENERAL, ISOTROPIC, NO_ROTATION
+from physics.motion.drive_commands import worlds_last
 from physics.reference import scenes
 from physics.reference.scenes import BALL, CUBE, GRAVITY, settled
 
@@ -693,3 +694,11 @@ def test_a_step_in_which_a_body_would_sink_by_half_its_width_is_refused_with_one
 def test_a_body_that_meets_nothing_or_has_its_own_stiffness_may_have_any_step():
     World(Scene([Body(Sphere(0.02), mass=0.1)]), Fidelity(substep=1.0))
     World(scenes.block_on_ground(stiffness=10.0), Fidelity(substep=0.01))
+
+
+def test_a_command_that_is_broadcast_has_the_type_of_any_other():
+    """Or each kind of array would have a kernel of its own."""
+    one = np.broadcast_to(np.zeros(3), (1, 1, 3))
+    assert not one.flags.writeable
+    assert worlds_last(one).flags.writeable
+    assert worlds_last(np.zeros((4, 2, 3))).flags.c_contiguous
