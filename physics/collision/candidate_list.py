@@ -8,7 +8,8 @@ zeros: a weight of zero makes them no contact.
 import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
-from physics.collision.distances import core_distance
+from physics.collision.distances import box_distance, core_distance, cylinder_distance
+from physics.collision.entry_face import make_entry_face
 from physics.collision.facing import FLOORS, facing
 from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
@@ -17,7 +18,7 @@ from physics.collision.surface_kinds import by_surface_kind
 from physics.compiler.jit import at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.scene.shapes import GRID, PARTICLES, PLANE
+from physics.scene.shapes import BOX, CYLINDER, GRID, PARTICLES, PLANE
 
 # relative to the skin: motion after which a list that isn't empty is replaced at the latest
 _LONGEST_TRAVEL = 4.0
@@ -48,11 +49,14 @@ def make_clear(features):
 def make_add_candidate(features):
     """Stage that writes a candidate into a slot, with the memory that its sample had before."""
     memory_size, impulse = contact_memory(features).size, features.impulse
-    hidden = features.box and features.compound
+    hidden, remembered_face = features.box and features.compound, contact_memory(features).face
 
     @stage
-    def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight):
-        """`old`: the list before, `count` long; ids below `cursor` are done. Returns the cursor."""
+    def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight, face):
+        """`old`: the list before, `count` long; ids below `cursor` are done. Returns the cursor.
+
+        A sample that was not in it came in through `face`, see `entry_face`.
+        """
         while cursor < count and old[cursor].sample_id < sample_id:
             cursor += 1
         known = cursor < count and old[cursor].sample_id == sample_id
@@ -65,6 +69,8 @@ def make_add_candidate(features):
                 row.hidden_offset[axis, i] = 0.0
         for m in range(memory_size):
             row.memory[m, i] = old[cursor].memory[m] if known else 0.0
+        if remembered_face >= 0 and not known:
+            row.memory[remembered_face, i] = face
         if impulse:
             for axis in range(3):
                 row.impact_force[axis, i] = 0.0
@@ -85,6 +91,8 @@ def make_list_samples(features):
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
     )
     turn = by_surface_kind(features, lambda kind: facing(kind) if kind in FLOORS else None)
+    box, cylinder = features.box, features.cylinder
+    remembered_face, entry_face = contact_memory(features).face, make_entry_face(features, turn)
 
     @stage
     def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):
@@ -110,7 +118,7 @@ def make_list_samples(features):
         candidate = state.candidate[g, first : first + room]
         ids = state.sample_id[g, first : first + room]
         R, c = relative.rotation, relative.position
-        height = at(half_pair.core[0], i) if half_pair.kind == PLANE else 0.0
+        ground = at(half_pair.core[0], i) if half_pair.kind == PLANE else 0.0
         radius, load_share = at(half_pair.radius, i), at(half_pair.load_share, i)
         n = 0
         cursor = 0
@@ -118,6 +126,10 @@ def make_list_samples(features):
         pairs = particles and half_pair.partner_count > 0
         if not pairs:
             separations(model, half_pair, i, relative, workspace.separation)
+        face, face_normals = 0.0, half_pair.face_normals != 0
+        faces = (box and half_pair.kind == BOX) or (cylinder and half_pair.kind == CYLINDER)
+        if faces and face_normals:
+            face = entry_face(model, workspace, half_pair, i, relative)
         for s in range(half_pair.sample_count):
             separation = 0.0 if pairs else workspace.separation[s]
             if not pairs and not separation < reach:
@@ -135,7 +147,7 @@ def make_list_samples(features):
                 tx, ty = turn(half_pair.kind, sx, sy, sz, R, c, i, ca, cb, cc)
             x = R[0, i] * tx + R[1, i] * ty + R[2, i] * sz + c[0, i]
             y = R[3, i] * tx + R[4, i] * ty + R[5, i] * sz + c[1, i]
-            z = R[6, i] * tx + R[7, i] * ty + R[8, i] * sz + c[2, i] - height
+            z = R[6, i] * tx + R[7, i] * ty + R[8, i] * sz + c[2, i] - ground
             if pairs:
                 for j in range(half_pair.partner_count):
                     p = model.sample[:, half_pair.first_partner + j]
@@ -151,7 +163,7 @@ def make_list_samples(features):
                         row, pair_id = candidate[n], s * half_pair.partner_count + j
                         smaller = min(weight, p[3])
                         cursor = add_candidate(
-                            row, i, old, cursor, old_count, pair_id, sx, sy, sz, smaller
+                            row, i, old, cursor, old_count, pair_id, sx, sy, sz, smaller, 0.0
                         )
                         row.partner[0, i] = px
                         row.partner[1, i] = py
@@ -161,8 +173,13 @@ def make_list_samples(features):
                     elif separation < nearest:
                         nearest = separation
             else:
+                row = candidate[n]
+                overlaps = separation < 0.0
+                cursor = add_candidate(
+                    row, i, old, cursor, old_count, s, sx, sy, sz, weight, face if overlaps else 0.0
+                )
                 if impulse:
-                    core, face_normals = half_pair.core, half_pair.face_normals != 0
+                    core = half_pair.core
                     ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                     _, nx, ny, nz = distance(
                         half_pair.kind, x, y, z, ca, cb, cc, radius, face_normals
@@ -170,21 +187,45 @@ def make_list_samples(features):
                     if grid and half_pair.kind == GRID:
                         size = at(half_pair.surface_size, i)
                         _, nx, ny, nz = grid_distance(model, half_pair.grid, size, x, y, z)
+                    # as the contact will be, which remembers a face
+                    if box and half_pair.kind == BOX and overlaps:
+                        height, nx, ny, nz, _ = box_distance(
+                            x,
+                            y,
+                            z,
+                            ca,
+                            cb,
+                            cc,
+                            row.memory[remembered_face, i],
+                            radius,
+                            face_normals,
+                        )
+                        separation = height - radius
+                    if cylinder and half_pair.kind == CYLINDER and overlaps:
+                        height, nx, ny, nz, _ = cylinder_distance(
+                            x,
+                            y,
+                            z,
+                            ca,
+                            cb,
+                            cc,
+                            row.memory[remembered_face, i],
+                            radius,
+                            face_normals,
+                        )
+                        separation = height - radius
                     add_manifold_point(
                         workspace.manifold[first_point + n],
                         workspace.solid[half_pair.frame],
                         i,
                         x,
                         y,
-                        z + height,
+                        z + ground,
                         nx,
                         ny,
                         nz,
                         separation,
                     )
-                cursor = add_candidate(
-                    candidate[n], i, old, cursor, old_count, s, sx, sy, sz, weight
-                )
                 ids[n, i] = s
                 n += 1
         if n > 0:
