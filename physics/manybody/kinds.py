@@ -16,6 +16,7 @@ from physics.model.features import GENERAL, Features
 from physics.model.tables import Model
 from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
+from physics.scene.flush_statics import join_flush
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground, Static, touch_each_other
 from physics.scene.validation import ZERO
@@ -44,7 +45,7 @@ class Kinds(NamedTuple):
 
 def find_kinds(scene: Scene, fidelity: Fidelity) -> Kinds:
     """The kinds of a scene's solids."""
-    solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
+    solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *join_flush(scene.statics)]
     known: dict[Any, int] = {}
     of_solid = np.array([known.setdefault(_identity(solid), len(known)) for solid in solids])
     examples = [solids[int(np.argmax(of_solid == kind))] for kind in range(len(known))]

@@ -29,6 +29,7 @@ from physics.model.tables import (
 )
 from physics.scene.fidelity import INTEGRATORS, TIME_CONTROLS, Fidelity
 from physics.scene.fields import PointSpring, SurfaceDrag
+from physics.scene.flush_statics import FlushBox
 from physics.scene.internal_faces import HiddenFace, hidden_faces
 from physics.scene.mesh import Mesh
 from physics.scene.parameters import Parameters
@@ -167,7 +168,9 @@ def _compound_part_rows(layout: Layout) -> tuple[Array, Array]:
     for solid in dict.fromkeys(solid for solid, _ in layout.parts):
         parts = [part for owner, part in layout.parts if owner == solid]
         own = rows[[owner == solid for owner, _ in layout.parts]]
-        for row, part, faces in zip(own, parts, hidden_faces(parts), strict=True):
+        shape = parts[0].shape
+        found = [list(shape.hidden)] if isinstance(shape, FlushBox) else hidden_faces(parts)
+        for row, part, faces in zip(own, parts, found, strict=True):
             row["solid"], row["rotation"] = solid, part.rotation.ravel()
             row["first_hidden_face"], row["hidden_face_count"] = len(hidden), len(faces)
             hidden += faces

@@ -15,6 +15,7 @@ from physics.scene.compound import Compound, SampleSet
 from physics.scene.cylinder import Cylinder
 from physics.scene.drives import Drive
 from physics.scene.fidelity import FIND_IMPACTS, Fidelity
+from physics.scene.flush_statics import FlushBox, join_flush
 from physics.scene.material import Material
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
@@ -103,10 +104,11 @@ class Layout(NamedTuple):
         `own_spacing`: each solid's width alone sets the spacing of its samples. `no_half_pairs`:
         only the solids.
         """
-        solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *scene.statics)
+        statics = join_flush(scene.statics)
+        solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *statics)
         parts = tuple((i, part) for i, solid in enumerate(solids) for part in _parts(solid))
         half_pairs = (
-            () if no_half_pairs else tuple(_half_pairs(scene, fidelity, parts, own_spacing))
+            () if no_half_pairs else tuple(_half_pairs(scene, solids, fidelity, parts, own_spacing))
         )
         modes = [(1.0, 1.0)] * len(solids)
         leverage = [0.0] * len(solids)
@@ -162,18 +164,23 @@ def is_floor(solid: Solid, shape: Shape, fidelity: Fidelity) -> bool:
 
 
 def _parts(solid: Solid) -> tuple[Part, ...]:
-    """The parts of a compound, which have a surface each; none for other solids."""
+    """What has a surface with a frame: parts of a compound, a `FlushBox`; none for other solids."""
     if isinstance(solid, Ground):
         return ()
     shape = _single(solid.shape)
+    if isinstance(shape, FlushBox):
+        return (Part(shape),)
     return tuple(shape.parts) if isinstance(shape, Compound) else ()  # type: ignore[arg-type]
 
 
 def _half_pairs(
-    scene: Scene, fidelity: Fidelity, parts: tuple[tuple[int, Part], ...], own_spacing: bool
+    scene: Scene,
+    solids: tuple[Solid, ...],
+    fidelity: Fidelity,
+    parts: tuple[tuple[int, Part], ...],
+    own_spacing: bool,
 ) -> Iterator[HalfPair]:
     """All half-pairs through which the scene's solids can touch, in a fixed order."""
-    solids: list[Solid] = [*scene.bodies, *scene.driven_bodies, *scene.statics]
     dynamic_count = len(scene.bodies) + len(scene.driven_bodies)
 
     def rounding(solid: Body | Drive | Static) -> float:
@@ -224,6 +231,7 @@ def _half_pairs(
             )
             for samples, flat in sample_sets(a, b, least)
             for k, surface in surfaces
+            if len(samples.weights)  # flush neighbours may leave none
         ]  # fmt: skip
 
     first_drive = len(scene.bodies)
@@ -259,5 +267,6 @@ def _half_pairs(
             elif isinstance(_single(b.shape), Sphere):
                 yield from between(j, i)
             else:
-                for half_pair in (*between(i, j), *between(j, i)):
-                    yield half_pair._replace(both_sampled=True)
+                there, back = between(i, j), between(j, i)
+                for half_pair in (*there, *back):
+                    yield half_pair._replace(both_sampled=bool(there and back))

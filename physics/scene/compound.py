@@ -211,15 +211,7 @@ class Compound:
             points: [n, 3] m, positions of its samples in the compound's frame.
             radius: m, of its samples; 0 for a box.
         """
-        others = [part for j, part in enumerate(self._parts) if j != i]
-        if not others:
-            return np.ones(len(points), dtype=bool)
-        deepest = np.min([part.distance(points) for part in others], axis=0)
-        if np.any(radius):
-            return np.asarray(deepest > -radius - _SAME * self.width)
-        around = points[:, None] + _AROUND * self.width * _DIRECTIONS
-        filled = np.min([part.distance(around) for part in self._parts], axis=0) < 0.0
-        return (deepest > _SAME * self.width) | (filled.mean(axis=1) < _FLAT)
+        return uncovered(self._parts, i, points, self.width, radius)
 
     def particles(self, spacing: float) -> Samples:
         """Raises an error: compounds have no particles.
@@ -238,6 +230,26 @@ class Compound:
         if self.only is None:
             raise ValueError("a Compound has a surface for each of its parts, not a common surface")
         return self.only.surface(rounding)
+
+
+def uncovered(
+    parts: Sequence[Part], i: int, points: Array, width: float, radius: float | Array = 0.0
+) -> Array:
+    """Mask [n] of points [n, 3] m of part i that other parts do not cover, see `Compound._useful`.
+
+    `width` in m is the smallest one of all parts.
+    """
+    others = [part for j, part in enumerate(parts) if j != i]
+    if not others:
+        return np.ones(len(points), dtype=bool)
+    deepest = np.min([part.distance(points) for part in others], axis=0)
+    if np.any(radius):
+        return np.asarray(deepest > -radius - _SAME * width)
+    free = np.asarray(deepest > _SAME * width)
+    around = points[~free, None] + _AROUND * width * _DIRECTIONS
+    filled = np.min([part.distance(around) for part in parts], axis=0) < 0.0
+    free[~free] = filled.mean(axis=1) < _FLAT
+    return free
 
 
 def _part(i: int, item: Any) -> Part:

@@ -1,4 +1,4 @@
-"""Hidden faces: the areas of a compound's box faces that other boxes of the compound cover.
+"""Hidden faces: the areas of box faces that other boxes of a compound, or flush statics, cover.
 
 Where one box of a compound touches the face of another, no solid can enter through the covered
 area. A sample that slides from one box to the other must not be pushed out through this area. Each
@@ -57,13 +57,20 @@ def hidden_faces(parts: Sequence[Part]) -> list[list[HiddenFace]]:
     """
     found: list[list[HiddenFace]] = [[] for _ in parts]
     for i, j in permutations(range(len(parts)), 2):
-        width = min(parts[i].shape.width, parts[j].shape.width)
-        found[i] += _between(parts[i], parts[j], math.copysign(_ASIDE * width, j - i))
+        found[i] += faces_behind(parts[i], parts[j], plane_shift(parts[i], parts[j], j - i))
     return found
 
 
-def _between(part: Part, other: Part, shift: float) -> list[HiddenFace]:
-    """Faces of `part` that `other` hides; their planes are shifted outward by `shift` m."""
+def plane_shift(part: Part, other: Part, order: int) -> float:
+    """How far face planes of a part are shifted out, in m; `order` > 0: it is the earlier part."""
+    return math.copysign(_ASIDE * min(part.shape.width, other.shape.width), order)
+
+
+def faces_behind(part: Part, other: Part, shift: float, level: bool = False) -> list[HiddenFace]:
+    """Faces of `part` that `other` hides; their planes are shifted outward by `shift` m.
+
+    With `level`, only where the two have another face in one plane.
+    """
     if not isinstance(part.shape, Box) or not isinstance(other.shape, Box):
         return []
     rotation = np.abs(part.rotation.T @ other.rotation)
@@ -72,11 +79,15 @@ def _between(part: Part, other: Part, shift: float) -> list[HiddenFace]:
     # `extents` and `center` are those of the other box, in the frame of this box
     half, extents = np.array(part.shape.half_extents), rotation @ np.array(other.shape.half_extents)
     center, same = part.inward(np.array(other.position)), _SAME * part.shape.width
+    above, below = center + extents - half, center - extents + half
+    is_level = np.minimum(np.abs(above), np.abs(below)) <= same
     found = []
     for axis in range(3):
         across = [(axis + 1) % 3, (axis + 2) % 3]
         low, high = center[across] - extents[across], center[across] + extents[across]
         if np.any(high < same - half[across]) or np.any(low > half[across] - same):
+            continue
+        if level and not np.any(is_level[across]):
             continue
         low = np.where(low < same - half[across], -math.inf, low)
         high = np.where(high > half[across] - same, math.inf, high)
