@@ -8,7 +8,7 @@ zeros: a weight of zero makes them no contact.
 import math
 
 from physics.collision.contact_point import TOUCH_TOLERANCE
-from physics.collision.distances import box_distance, core_distance, cylinder_distance
+from physics.collision.distances import core_distance
 from physics.collision.entry_face import make_entry_face
 from physics.collision.facing import FLOORS, facing
 from physics.collision.grid_distance import grid_distance
@@ -92,7 +92,7 @@ def make_list_samples(features):
     )
     turn = by_surface_kind(features, lambda kind: facing(kind) if kind in FLOORS else None)
     box, cylinder = features.box, features.cylinder
-    remembered_face, entry_face = contact_memory(features).face, make_entry_face(features, turn)
+    entry_face = make_entry_face(features, turn)
 
     @stage
     def list_samples(model, state, workspace, g, k, i, relative, old_count, first_point, reach):
@@ -187,33 +187,6 @@ def make_list_samples(features):
                     if grid and half_pair.kind == GRID:
                         size = at(half_pair.surface_size, i)
                         _, nx, ny, nz = grid_distance(model, half_pair.grid, size, x, y, z)
-                    # as the contact will be, which remembers a face
-                    if box and half_pair.kind == BOX and overlaps:
-                        height, nx, ny, nz, _ = box_distance(
-                            x,
-                            y,
-                            z,
-                            ca,
-                            cb,
-                            cc,
-                            row.memory[remembered_face, i],
-                            radius,
-                            face_normals,
-                        )
-                        separation = height - radius
-                    if cylinder and half_pair.kind == CYLINDER and overlaps:
-                        height, nx, ny, nz, _ = cylinder_distance(
-                            x,
-                            y,
-                            z,
-                            ca,
-                            cb,
-                            cc,
-                            row.memory[remembered_face, i],
-                            radius,
-                            face_normals,
-                        )
-                        separation = height - radius
                     add_manifold_point(
                         workspace.manifold[first_point + n],
                         workspace.solid[half_pair.frame],
