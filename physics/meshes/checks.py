@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 
+from physics.meshes.parts import inverted_part
 from physics.meshes.properties import properties
 
 Array = np.ndarray
@@ -62,12 +63,24 @@ def check_solid_mesh(vertices: Array, faces: Array) -> None:
     box = float(np.prod(vertices.max(axis=0) - vertices.min(axis=0)))
     if abs(volume) <= _FLAT * box or box == 0.0:
         raise ValueError(f"Mesh must enclose a volume, got one of {volume:.3g} m^3")
-    if volume < 0.0:
+    if volume < 0.0 and inverted_part(vertices, faces[:, ::-1]) is None:
         raise ValueError(
             f"Mesh.faces must wind counterclockwise as seen from outside, got an inverted mesh "
             f"(volume {volume:.3g} m^3): reverse the faces, faces[:, ::-1] or "
             "trimesh.Trimesh.invert"
         )
+    part = inverted_part(vertices, faces)
+    if part is not None:
+        raise ValueError(
+            f"Mesh.faces must wind counterclockwise as seen from outside, got a part of "
+            f"{part.faces} faces from {_place(part.low)} to {_place(part.high)} (volume "
+            f"{part.volume:.3g} m^3) that is turned inwards and not a cavity in another part: "
+            "reverse its faces, faces[:, ::-1], or use trimesh.repair.fix_normals(multibody=True)"
+        )
+
+
+def _place(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
 
 
 def warn_if_thin(thickness: float, cell: float, cells: float, what: str) -> None:

@@ -29,6 +29,53 @@ def test_faces_that_disagree_are_named():
         Mesh(vertices=VERTICES, faces=faces)
 
 
+def together(*parts):
+    """Several meshes in one, each with its offset in m and whether it is turned inwards."""
+    vertices, faces, count = [], [], 0
+    for half, offset, inwards in parts:
+        v, f = meshes.cuboid(half)
+        vertices.append(v + np.array(offset))
+        faces.append((f[:, ::-1] if inwards else f) + count)
+        count += len(v)
+    return {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
+
+
+LARGE = ((0.05, 0.05, 0.05), (0.0, 0.0, 0.0), False)
+
+
+@pytest.mark.parametrize("place", [0.075, 0.076, 0.2, 100.0])
+def test_a_part_that_is_turned_inwards_beside_another_is_named(place):
+    """Side by side, flush or far apart; its volume would count as 0.000875 m^3 instead of 0.001125."""
+    small = ((0.025, 0.025, 0.025), (place, 0.0, 0.0), True)
+    with pytest.raises(ValueError, match=r"a part of 12 faces from \(.*volume -0.000125 m\^3"):
+        Mesh(**together(LARGE, small))
+
+
+def test_of_a_large_part_turned_inwards_and_a_small_one_the_large_one_is_named():
+    large = (LARGE[0], LARGE[1], True)
+    with pytest.raises(ValueError, match=r"a part of 12 faces.*volume -0.001 m\^3"):
+        Mesh(**together(large, ((0.025, 0.025, 0.025), (0.2, 0.0, 0.0), False)))
+
+
+def test_a_part_turned_inwards_that_shares_an_edge_is_named():
+    small = ((0.05, 0.05, 0.025), (0.1, 0.1, 0.025), True)
+    with pytest.raises(ValueError, match="a part of 12 faces"):
+        Mesh(**together(LARGE, small))
+
+
+def test_a_cavity_that_sticks_out_of_its_part_is_named():
+    with pytest.raises(ValueError, match="not a cavity"):
+        Mesh(**together(LARGE, ((0.04, 0.01, 0.01), (0.03, 0.0, 0.0), True)))
+
+
+def test_cavities_solids_in_them_and_several_parts_are_right():
+    cavity = ((0.04, 0.04, 0.04), (0.0, 0.0, 0.0), True)
+    inner = ((0.02, 0.02, 0.02), (0.0, 0.0, 0.0), False)
+    beside = ((0.025, 0.025, 0.025), (0.075, 0.0, 0.0), False)
+    mesh = Mesh(**together(LARGE, cavity, inner, beside))
+    assert mesh.volume == pytest.approx(0.001 - 0.000512 + 0.000064 + 0.000125)
+
+
 def test_a_flat_mesh_has_no_volume():
     flat = VERTICES * np.array([1.0, 1.0, 0.0])
     with pytest.raises(ValueError, match="must enclose a volume"):
