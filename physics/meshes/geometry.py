@@ -9,8 +9,9 @@ from physics.directions import spread_directions
 from physics.meshes.distance_grid import DistanceGrid, distance_grid
 from physics.meshes.properties import principal_axes, properties
 from physics.meshes.read import merged
-from physics.meshes.samples import inset, surface_points
+from physics.meshes.samples import has_sharp_edges, inset, surface_points
 from physics.meshes.sides import flat_sides, weights
+from physics.meshes.support import Support
 
 Array = np.ndarray
 Rows = tuple[tuple[float, ...], ...]
@@ -22,6 +23,8 @@ _RAYS = 400
 _THIN = 0.1
 # directions along which the width is measured, beside those of the faces
 _DIRECTIONS = 500
+# of a weight of 1, that a side on which the mesh rests may lack
+_LACKS = 0.01
 # how many meshes are remembered
 _REMEMBERED = 64
 
@@ -113,12 +116,66 @@ def _thickness(vertices: Array, faces: Array) -> float:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def samples(vertices: Rows, faces: Triples, spacing: float, rounding: float) -> tuple[Array, Array]:
-    """Positions [n, 3] m and weights [n] of a mesh's samples."""
+def support(vertices: Rows, faces: Triples) -> Support:
+    """How far a mesh reaches."""
     solid = geometry(vertices, faces)
-    points, touching = surface_points(solid.vertices, solid.faces, spacing)
+    return Support(solid.vertices, solid.faces)
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def samples(
+    vertices: Rows,
+    faces: Triples,
+    spacing: float,
+    rounding: float,
+    sink: float = 0.0,
+) -> tuple[Array, Array, float]:
+    """Positions [n, 3] m, weights [n] and radius in m of a mesh's samples.
+
+    Args:
+        vertices: as in `geometry`.
+        faces: likewise.
+        spacing: m, largest distance between neighbours.
+        rounding: m, radius, which is larger where all of the mesh is rounder.
+        sink: m, by which a body at rest may be too low; 0: only the spacing counts.
+    """
+    solid = geometry(vertices, faces)
+    if sink == 0.0:
+        points, touching, _ = surface_points(solid.vertices, solid.faces, spacing, np.eye(3)[:0])
+        centres, normals = inset(points, touching, rounding)
+        return centres, weights(centres, normals, 0.0), rounding
+    reach = support(vertices, faces)
+    points, touching, extra = surface_points(solid.vertices, solid.faces, spacing, reach.directions)
+    chosen = ~np.array(extra)
+    if not has_sharp_edges(solid.vertices, solid.faces):
+        largest = min(reach.largest_radius(sink), 0.5 * solid.width)
+        convex = bool(reach.outer.all())
+        if not convex:
+            largest = min(largest, 0.25 * solid.thickness)
+        if largest > rounding:
+            rounding, chosen = largest, ~chosen & False
     centres, normals = inset(points, touching, rounding)
-    return centres, weights(centres, normals, rounding)
+    if rounding > 0.0:  # where many faces meet no ball at the vertex touches all of them
+        more, facing = reach.at_corners(solid.vertices, solid.faces, rounding, sink)
+        centres, normals = np.concatenate([centres, more]), np.concatenate([normals, facing])
+        chosen = np.concatenate([chosen, np.zeros(len(more), dtype=bool)])
+    if not chosen.any():
+        middle, ball = reach.one_ball(sink)
+        if ball > 0.0:
+            return middle[None], np.ones(1), ball
+    chosen[reach.missing(centres, chosen, sink)] = True
+    centres, normals = centres[chosen], normals[chosen]
+    shares = weights(centres, normals, sink, reach.normals)
+    own = [
+        (point - rounding * normal, normal)
+        for normal, mask, point in reach.resting_faces(centres, sink)
+        if shares[mask].sum() < 1.0 - _LACKS
+    ]
+    if own:
+        centres = np.concatenate([centres, [place for place, _ in own]])
+        normals = np.concatenate([normals, [normal for _, normal in own]])
+        shares = weights(centres, normals, sink, reach.normals)
+    return centres, shares, rounding
 
 
 @lru_cache(maxsize=_REMEMBERED)

@@ -2,7 +2,7 @@
 
 They lie at convex corners, along convex edges, and on round areas. Flat areas have none inside, as
 boxes have none on their faces: another solid touches there with its own samples. Concave edges have
-none either: no plane reaches them.
+none either, nor have hollow round areas: no plane reaches them.
 
 An edge is sharp if its two faces differ by more than 30 degrees. Sharp edges form curves, which are
 divided evenly. On round areas the point farthest from all samples becomes a sample, again and
@@ -14,6 +14,7 @@ p - r m, where n . m = 1 for the normals n of all faces that meet at p.
 """
 
 from collections import Counter, defaultdict
+from itertools import product
 
 import numpy as np
 
@@ -29,6 +30,8 @@ _LONGEST = 3.0
 _FINER = 2.0
 # of a length, below which a difference is round-off
 _SAME = 1e-6
+# a cell of a grid and those around it
+_AROUND = tuple(product((-1, 0, 1), repeat=3))
 
 
 class _Edges:
@@ -37,8 +40,9 @@ class _Edges:
     Attributes:
         ends: [e, 2] vertices.
         faces: [e, 2].
-        sharp: mask [e] of convex edges.
-        flat: mask [e] of edges within a plane.
+        sharp: mask [e] of convex edges with more than 30 degrees between their faces.
+        hollow: mask [e] of such concave edges.
+        round: mask [e] of convex edges with less, but not within a plane.
     """
 
     def __init__(self, vertices: Array, faces: Array, normals: Array) -> None:
@@ -56,18 +60,24 @@ class _Edges:
         cosine = np.einsum("ei,ei->e", normals[owner[one]], normals[owner[two]])
         beyond = vertices[opposite[two]] - vertices[self.ends[:, 0]]
         convex = np.einsum("ei,ei->e", normals[owner[one]], beyond) < 0.0
-        self.flat = cosine > _FLAT
         self.sharp = (cosine < _SHARP) & convex
         self.hollow = (cosine < _SHARP) & ~convex
+        self.round = (cosine >= _SHARP) & (cosine <= _FLAT) & convex
 
 
-def surface_points(vertices: Array, faces: Array, spacing: float) -> tuple[Array, list[Array]]:
-    """Points [n, 3] m of the surface, and of each the unit normals [k, 3] of its faces.
+def surface_points(
+    vertices: Array, faces: Array, spacing: float, directions: Array
+) -> tuple[Array, list[Array], list[bool]]:
+    """Points [n, 3] m of the surface, of each the unit normals [k, 3] of its faces, and its kind.
+
+    The kind is whether it is only the outermost vertex along one of the directions, see `support`:
+    it is a sample if no other is nearly as far out.
 
     Args:
         vertices: [v, 3] m.
         faces: [f, 3], of a closed mesh.
         spacing: m.
+        directions: [d, 3].
     """
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -82,9 +92,14 @@ def surface_points(vertices: Array, faces: Array, spacing: float) -> tuple[Array
             around[int(v)].append(int(f))
     points: list[Array] = []
     touching: list[Array] = []
+    # what is nearer than a cell is long is in the same cell or in one around it
+    cells: dict[tuple[int, ...], list[Array]] = defaultdict(list)
 
     def add(point: Array, of_faces: Array, apart: float) -> None:
-        if not points or np.min(np.sum((np.array(points) - point) ** 2, axis=1)) >= apart**2:
+        i, j, k = (int(x) for x in np.floor(point / apart))
+        near = [q for n in _AROUND for q in cells.get((i + n[0], j + n[1], k + n[2]), ())]
+        if not near or np.min(np.sum((np.array(near) - point) ** 2, axis=1)) >= apart**2:
+            cells[i, j, k].append(point)
             points.append(point)
             touching.append(normals[of_faces])
 
@@ -105,7 +120,21 @@ def surface_points(vertices: Array, faces: Array, spacing: float) -> tuple[Array
             points.append(candidates[k])
             touching.append(normals[owners[k]])
             apart = np.minimum(apart, np.sum((candidates - candidates[k]) ** 2, axis=1))
-    return np.array(points).reshape(-1, 3), touching
+    chosen = len(points)
+    for v in np.unique(np.argmax(vertices @ directions.T, axis=0)).tolist():
+        points.append(vertices[v])
+        touching.append(normals[np.array(around[v])])
+    extra = [k >= chosen for k in range(len(points))]
+    return np.array(points).reshape(-1, 3), touching, extra
+
+
+def has_sharp_edges(vertices: Array, faces: Array) -> bool:
+    """Whether a convex edge of a closed mesh is sharp."""
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(area > 0.0, area, 1.0)
+    return bool(_Edges(vertices, faces, normals).sharp.any())
 
 
 def inset(points: Array, touching: list[Array], radius: float) -> tuple[Array, Array]:
@@ -180,13 +209,13 @@ def _along(
 def _round_points(
     vertices: Array, faces: Array, edges: _Edges, around: dict[int, list[int]], spacing: float
 ) -> tuple[Array, list[Array]]:
-    """Points [n, 3] m on faces that are not part of a plane, and the faces of each."""
+    """Points [n, 3] m on faces that bend outwards, and the faces of each."""
     bends = np.zeros(len(faces), dtype=bool)
-    bends[edges.faces[~(edges.flat | edges.sharp | edges.hollow)].ravel()] = True
+    bends[edges.faces[edges.round].ravel()] = True
     in_hollow = set(edges.ends[edges.hollow].ravel().tolist())
     points: list[Array] = []
     owners: list[Array] = []
-    for v in sorted({int(v) for v in faces[bends].ravel()} - in_hollow):
+    for v in sorted({int(v) for v in edges.ends[edges.round].ravel()} - in_hollow):
         points.append(vertices[v])
         owners.append(np.array(around[v]))
     for f in np.flatnonzero(bends):
@@ -198,7 +227,7 @@ def _round_points(
                 points.append(a + (b - a) * (i / n) + (c - a) * (j / n))
                 owners.append(np.array([f]))
     # points within an edge have two faces
-    for e in np.flatnonzero(~(edges.flat | edges.sharp | edges.hollow)):
+    for e in np.flatnonzero(edges.round):
         a, b = vertices[edges.ends[e]]
         n = int(np.ceil(_FINER * np.linalg.norm(b - a) / spacing))
         for i in range(1, n):

@@ -4,9 +4,9 @@ A side is a face of the convex hull of the samples: a plane that touches at leas
 has all others behind it. It is found by rolling: a plane touches the outermost sample along some
 direction, turns about it until it touches a second, and about both until it touches a third.
 
-The samples on a side share its load equally, so that the weights of each side sum to 1. A sample on
-several sides has the least of its weights, so no side has more than 1. A sample that is alone
-supports all of the load: then a solid with round sides sinks as deep as a ball.
+The samples on a side share its load equally, or such that the weights of each side sum to 1 where
+sides share samples, and no side has more. A sample that is alone supports all of the load: then a
+solid with round sides sinks as deep as a ball.
 """
 
 import numpy as np
@@ -19,6 +19,8 @@ Array = np.ndarray
 _DIRECTIONS = 400
 # blocks in which they are rolled, to save memory
 _BLOCKS = 20
+# times that weights are multiplied by what their sides lack
+_ROUNDS = 100
 # of a solid's reach, below which a height over a side is round-off
 _SAME = 1e-6
 
@@ -76,22 +78,21 @@ def sides(points: Array) -> Array:
     return np.asarray(normals[np.unique(np.argmax(alike, axis=1))])
 
 
-def touched_sides(points: Array, tolerance: float) -> tuple[Array, Array]:
-    """Normals [k, 3] of the sides, and a mask [k, n] of the points within `tolerance` m of each."""
-    normals = sides(points)
+def touched_by(points: Array, normals: Array, tolerance: float) -> Array:
+    """Mask [k, n] of the points within `tolerance` m of the outermost along each normal."""
     heights = normals @ points.T
     tolerance = max(tolerance, _SAME * float(np.abs(points).max(initial=0.0)))
     highest = heights.max(axis=1, initial=-np.inf, keepdims=True) if len(points) else heights
-    return normals, heights >= highest - tolerance
+    return np.asarray(heights >= highest - tolerance)
 
 
 def flat_sides(points: Array) -> Array:
     """Normals [k, 3] of the sides that more than three of the points touch: any plane has three."""
-    normals, touched = touched_sides(points, 0.0)
-    return np.asarray(normals[touched.sum(axis=1) > 3])
+    normals = sides(points)
+    return np.asarray(normals[touched_by(points, normals, 0.0).sum(axis=1) > 3])
 
 
-def weights(points: Array, normals: Array, tolerance: float) -> Array:
+def weights(points: Array, normals: Array, tolerance: float, others: Array | None = None) -> Array:
     """Weights [n] of samples, see the docstring of this module.
 
     Args:
@@ -99,12 +100,43 @@ def weights(points: Array, normals: Array, tolerance: float) -> Array:
         normals: [n, 3], outward normals where the samples are; used for those on no side, in
             hollows: they share their load with those in the same tangent plane.
         tolerance: m, height over a side of the samples that share its load.
+        others: [k, 3] normals of more sides; None: those that are found by rolling suffice.
     """
-    _, touched = touched_sides(points, tolerance)
+    planes = sides(points) if others is None else np.concatenate([sides(points), others])
+    touched = touched_by(points, planes, tolerance)
+    touched = np.unique(touched, axis=0) if len(touched) else touched
     shared = np.where(touched, touched.sum(axis=1, keepdims=True), 0).max(axis=0, initial=0)
     tolerance = max(tolerance, _SAME * float(np.abs(points).max(initial=0.0)))
     for i in np.flatnonzero(shared == 0):
         height = (points - points[i]) @ normals[i]
         alike = normals @ normals[i] > 0.5 * np.linalg.norm(normals[i])
         shared[i] = max(1, np.count_nonzero((np.abs(height) <= tolerance) & alike))
-    return np.asarray(1.0 / shared)
+    return _balanced(touched, 1.0 / shared)
+
+
+def _balanced(touched: Array, found: Array) -> Array:
+    """Weights [n] that sum to 1 on each side, or less where sides share too much of them.
+
+    A sample on several sides begins with the least of its equal parts; all are then multiplied by
+    what their sides lack, again and again (iterative proportional fitting).
+
+    Args:
+        touched: mask [k, n].
+        found: [n] where to begin.
+    """
+    if not len(touched):
+        return found
+    member = touched.astype(float)
+    sides_of = np.maximum(member.sum(axis=0), 1.0)
+    for _ in range(_ROUNDS):
+        lacks = np.log(member @ found)
+        if np.abs(lacks).max() < _SAME:
+            break
+        found = found * np.exp(-(lacks @ member) / sides_of)
+    most = np.where(touched, (member @ found)[:, None], 0.0).max(axis=0, initial=0.0)
+    found = found / np.maximum(most, 1.0)
+    own = touched & (touched.sum(axis=0) == 1)
+    for side, mine in zip(touched, own, strict=True):  # what is on one side alone takes the rest
+        if mine.any():
+            found[mine] *= 1.0 + (1.0 - found[side].sum()) / found[mine].sum()
+    return np.asarray(found)

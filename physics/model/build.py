@@ -215,6 +215,7 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         row["face_normals"] = half_pair.face_normals
         ends = (layout.solids[owner], layout.solids[surface])
         row["keeps_all"] = any(isinstance(getattr(s, "shape", None), Mesh) for s in ends)
+        row["crowding"] = half_pair.crowding
         row["axial"] = half_pair.samples.axial
         row["slide_slope"] = 1.0
         row["impact_tolerance"] = layout.fidelity.impact_tolerance

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.model.mesh_samples import impact_depth, pressed, sink, stiffest
 from physics.model.rocking import fastest_modes, rocking_leverage
 from physics.scene.compound import Compound, SampleSet
 from physics.scene.cylinder import Cylinder
@@ -42,6 +43,7 @@ class HalfPair(NamedTuple):
         part: index into `Layout.parts` of the compound part whose surface it is, or -1.
         face_normals: see `distances.box_distance`.
         inner: the samples are balls inside a cylinder, which touch where its rims don't.
+        crowding: see `mesh_samples.pressed`.
     """
 
     owner: int
@@ -53,6 +55,7 @@ class HalfPair(NamedTuple):
     part: int = -1
     face_normals: bool = False
     inner: bool = False
+    crowding: float = 1.0
 
     @property
     def capacity(self) -> int:
@@ -205,11 +208,26 @@ def _half_pairs(
         samples: tuple[Samples, ...]
         if isinstance(shape, Cylinder | Torus) and not is_floor(other, shape, fidelity):
             samples = shape.fixed_samples(distance, inset)
+        elif isinstance(shape, Mesh):
+            samples = (shape.samples(distance, inset, sink(fidelity)),)
         else:
             samples = (shape.samples(distance, inset),)
         if isinstance(shape, Cylinder):  # the balls inside it have no faces
             return tuple(SampleSet(one, one.radius == inset) for one in samples)
         return tuple(SampleSet(one, isinstance(shape, Box | Mesh)) for one in samples)
+
+    def pressed_sets(
+        solid: Body | Drive | Static, other: Solid, least: float = 0.0
+    ) -> Iterator[tuple[Samples, bool, float]]:
+        """The same with their `crowding`; where springs could be unstable weights are lowered."""
+        for samples, flat in sample_sets(solid, other, least):
+            if isinstance(solid.shape, Mesh) and fidelity.law == "spring":
+                shape = solid.shape
+                depth, most = impact_depth(shape, fidelity), stiffest(shape, fidelity)
+                samples, crowding = pressed(shape, samples, depth, most)
+                yield samples, flat, crowding
+            else:
+                yield samples, flat, 1.0
 
     def between(owner: int, other: int) -> list[HalfPair]:
         """The samples of one solid against all surfaces of another."""
@@ -228,8 +246,9 @@ def _half_pairs(
             HalfPair(
                 owner, other, samples, surface, None,
                 part=k, face_normals=flat, inner=isinstance(a.shape, Cylinder) and not flat,
+                crowding=crowding,
             )
-            for samples, flat in sample_sets(a, b, least)
+            for samples, flat, crowding in pressed_sets(a, b, least)
             for k, surface in surfaces
             if len(samples.weights)  # flush neighbours may leave none
         ]  # fmt: skip
@@ -246,8 +265,11 @@ def _half_pairs(
                 continue
             if isinstance(b, Ground):
                 plane = Surface(PLANE, (b.height, 0.0, 0.0), 0.0)
-                for samples, face_normals in sample_sets(a, b):
-                    yield HalfPair(i, j, samples, plane, None, face_normals=face_normals)
+                for samples, face_normals, crowding in pressed_sets(a, b):
+                    yield HalfPair(
+                        i, j, samples, plane, None,
+                        face_normals=face_normals, crowding=crowding,
+                    )  # fmt: skip
                 continue
             bodies = isinstance(a, Body) and isinstance(b, Body)
             if fidelity.geometry == "particle" and bodies:

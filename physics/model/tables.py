@@ -62,6 +62,10 @@ HALF_PAIR = np.dtype(
         # the world frame; and the slope above which it slides, over mu: more than 1 if it can roll
         ("gravity", "f8", (3,)),
         ("slide_slope", "f8"),
+        (
+            "crowding",
+            "f8",
+        ),  # factor on the rate at which damping relaxes, see `mesh_samples.pressed`
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together

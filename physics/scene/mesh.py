@@ -180,17 +180,30 @@ class Mesh:
         """The mesh with each length multiplied by `factor`."""
         return replace(self, scale=factor * self.scale)
 
-    def samples(self, spacing: float, rounding: float) -> Samples:
-        """Samples at corners, edges and round areas, see `physics.meshes.samples`.
+    def samples(
+        self,
+        spacing: float,
+        rounding: float,
+        sink: float = 0.0,
+    ) -> Samples:
+        """Samples at corners, edges and round areas, see `physics.meshes.samples` and `support`.
 
-        They are inset by at least `edge_radius`, or half of the walls, unless `rounding` is zero.
+        They are inset by at least `edge_radius`, or a quarter of the walls, unless `rounding` is
+        zero, and by more if the mesh is round all over.
+
+        Args:
+            spacing: m, largest distance between neighbouring samples.
+            rounding: m, radius of edges that are otherwise sharp.
+            sink: m, by which a body at rest may be lower than the mesh; 0: any depth.
         """
         if rounding > 0.0:
-            rounding = min(max(rounding, self.edge_radius), 0.5 * self.thickness)
-        positions, shares = geometry.samples(
-            self.vertices, self.faces, spacing / self.scale, rounding / self.scale
+            rounding = min(max(rounding, self.edge_radius), 0.25 * self.thickness)
+        positions, shares, radius = geometry.samples(
+            self.vertices,
+            self.faces,
+            *(x / self.scale for x in (spacing, rounding, sink)),
         )
-        return Samples(self.scale * positions, shares, rounding)
+        return Samples(self.scale * positions, shares, self.scale * radius)
 
     def particles(self, spacing: float) -> Samples:
         """Points of a cubic lattice inside the mesh, found by depth peeling.

@@ -190,7 +190,7 @@ def make_begin_half_pair(features):
             # a report, in steps of 0 s, splits nothing: parts may not be written
             part = mass / max(parts[i], 1.0) if splits else mass
             rate = part / h if h > 0.0 else 0.0
-            relative.inverse_mass[i] = 1.0 / mass
+            relative.inverse_mass[i] = half_pair.crowding / mass
             relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)
             if compound:  # until the loop these four fields are scratch, cleared below
                 weight, force = relative.current_weight[i], relative.normal_force_sum[i]

@@ -45,7 +45,7 @@ LARGE = ((0.05, 0.05, 0.05), (0.0, 0.0, 0.0), False)
 
 @pytest.mark.parametrize("place", [0.075, 0.076, 0.2, 100.0])
 def test_a_part_that_is_turned_inwards_beside_another_is_named(place):
-    """Side by side, flush or far apart; its volume would count as 0.000875 m^3 instead of 0.001125."""
+    """Flush, apart or far apart; its volume would count negative."""
     small = ((0.025, 0.025, 0.025), (place, 0.0, 0.0), True)
     with pytest.raises(ValueError, match=r"a part of 12 faces from \(.*volume -0.000125 m\^3"):
         Mesh(**together(LARGE, small))
