@@ -33,12 +33,14 @@ class Part(NamedTuple):
         volume: m^3, negative.
         low: [3] m, lower corner of its bounding box.
         high: [3] m.
+        label: number of the part, see `labels`.
     """
 
     faces: int
     volume: float
     low: Array
     high: Array
+    label: int
 
 
 def labels(faces: Array) -> Array:
@@ -93,5 +95,5 @@ def inverted_part(vertices: Array, faces: Array) -> Part | None:
             if abs(outside - round(outside)) < _UNKNOWN and round(outside) < 0:
                 points = corners[mine].reshape(-1, 3)
                 size = properties(vertices, faces[mine]).volume
-                return Part(len(mine), size, points.min(axis=0), points.max(axis=0))
+                return Part(len(mine), size, points.min(axis=0), points.max(axis=0), int(part))
     return None

@@ -1,16 +1,18 @@
 """Mesh: a solid that is given by the triangles of its surface."""
 
+import warnings
 from dataclasses import InitVar, dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from physics.meshes import geometry
+from physics.meshes import geometry, hull
 from physics.meshes.checks import check_arrays, check_solid_mesh, warn_if_thin
 from physics.meshes.distance_grid import DistanceGrid
 from physics.meshes.lattice import budgeted, lattice
 from physics.meshes.read import merged, read_mesh
+from physics.meshes.repair import repaired
 from physics.meshes.sides import weights
 from physics.orientation import from_matrix
 from physics.rotation import multiply, rotate
@@ -45,6 +47,10 @@ class Mesh:
             "mesh". Or give vertices and faces.
         vertices: [n, 3] in units of `scale`, in the file's frame; stored as nested tuples.
         faces: [m, 3] indices of vertices, counterclockwise as seen from outside; likewise.
+        convex_hull: whether the mesh is replaced by its convex hull, which needs the extra "mesh".
+            The surface needn't be closed then.
+        repair: whether open meshes are closed: faces are turned to wind alike, and each hole gets
+            a lid, see `physics.meshes.repair`. A warning says by how much the volume changes.
         scale: m per unit of the vertices, above zero: 0.001 for a file in millimetres.
         cells: cells of the distance grid along the longest side of the bounding box, at least 8.
         fill: of `Fidelity.geometry` "particle": "shell", particles along the surface, which is all
@@ -62,13 +68,20 @@ class Mesh:
     source: InitVar[Any] = None
     vertices: Any = None
     faces: Any = None
+    convex_hull: InitVar[bool] = False
+    repair: InitVar[bool] = False
     scale: float = 1.0
     cells: int = 48
     fill: str = "shell"
     particle_count: int | None = None
 
-    def __post_init__(self, source: Any) -> None:
+    def __post_init__(self, source: Any, convex_hull: bool, repair: bool) -> None:
         """Reads and checks the mesh."""
+        for name, value in (("convex_hull", convex_hull), ("repair", repair)):
+            if not isinstance(value, bool):
+                raise TypeError(f"Mesh.{name} must be True or False, got {value!r}")
+        if convex_hull and repair:
+            raise ValueError("Mesh takes either convex_hull or repair, got both: a hull is closed")
         given = (self.vertices is not None, self.faces is not None)
         if given not in ((True, True), (False, False)) or given[0] == (source is not None):
             named = zip(("source", "vertices", "faces"), (source is not None, *given), strict=True)
@@ -83,7 +96,18 @@ class Mesh:
         if triangles.dtype.kind not in "iu":
             raise TypeError(f"Mesh.faces must be integers, got {triangles.dtype}")
         check_arrays(points, triangles)
+        added = 0.0
+        if convex_hull:
+            points, triangles = hull.convex_hull(points)
+        elif repair:
+            points, triangles, added = repaired(points, triangles)
         check_solid_mesh(*merged(points, triangles))
+        object.__setattr__(self, "_added", added)
+        if added != 0.0:
+            warnings.warn(
+                f"Mesh was repaired: lids on its holes make {added:.2%} of its volume",
+                stacklevel=3,
+            )
         object.__setattr__(self, "vertices", tuple(map(tuple, points.tolist())))
         object.__setattr__(self, "faces", tuple(map(tuple, triangles.tolist())))
         object.__setattr__(self, "scale", positive("Mesh.scale", self.scale))
@@ -92,11 +116,17 @@ class Mesh:
         if self.particle_count is not None:
             integer("Mesh.particle_count", self.particle_count, low=1)
 
+    @property
+    def volume_change(self) -> float:
+        """Fraction of the volume that `repair` added, between lids and the middle of the mesh."""
+        return float(self.__dict__.get("_added", 0.0))
+
     def __repr__(self) -> str:
         """Sizes; vertices and faces would fill pages."""
+        change = f", {self.volume_change:.2%} of it by repair" if self.volume_change else ""
         return (
             f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces, volume "
-            f"{self.volume:.4g} m^3, cells={self.cells})"
+            f"{self.volume:.4g} m^3{change}, cells={self.cells})"
         )
 
     @cached_property
@@ -178,7 +208,9 @@ class Mesh:
 
     def scaled(self, factor: float) -> "Mesh":
         """The mesh with each length multiplied by `factor`."""
-        return replace(self, scale=factor * self.scale)
+        found = replace(self, scale=factor * self.scale)
+        object.__setattr__(found, "_added", self.volume_change)
+        return found
 
     def samples(
         self,
