@@ -11,6 +11,8 @@ Array = np.ndarray
 
 # volume, over that of the bounding box, below which a mesh is flat
 _FLAT = 1e-9
+# mean thickness, over the size, below which it is round-off of single precision
+_THINNEST = 1e-6
 
 
 def check_arrays(vertices: Array, faces: Array) -> None:
@@ -63,6 +65,14 @@ def check_solid_mesh(vertices: Array, faces: Array) -> None:
     box = float(np.prod(vertices.max(axis=0) - vertices.min(axis=0)))
     if abs(volume) <= _FLAT * box or box == 0.0:
         raise ValueError(f"Mesh must enclose a volume, got one of {volume:.3g} m^3")
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    size = float(np.ptp(vertices, axis=0).max())
+    if 2.0 * abs(volume) <= _THINNEST * size * area:
+        raise ValueError(
+            f"Mesh must enclose a volume, got one of {volume:.3g} m^3 within an area of "
+            f"{area:.3g} m^2: a sheet of {2.0 * abs(volume) / area:.2g} m; give it a thickness"
+        )
     if volume < 0.0 and inverted_part(vertices, faces[:, ::-1]) is None:
         raise ValueError(
             f"Mesh.faces must wind counterclockwise as seen from outside, got an inverted mesh "

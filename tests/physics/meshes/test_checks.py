@@ -82,6 +82,12 @@ def test_a_flat_mesh_has_no_volume():
         Mesh(vertices=flat, faces=FACES)
 
 
+def test_a_sheet_as_thin_as_round_off_has_no_volume():
+    """A file in single precision: it took minutes to build."""
+    with pytest.raises(ValueError, match=r"a sheet of 2e-09 m; give it a thickness"):
+        Mesh(vertices=VERTICES * np.array((1.0, 1.0, 5e-8)), faces=FACES)
+
+
 @pytest.mark.parametrize(
     ("settings", "error", "message"),
     [
