@@ -79,8 +79,12 @@ FAULTS = {
         "torque[1, i] += rz * fx + rx * fz", "spring/test_contact.py",
     ),
     "rebound of an impulse": Fault(
-        "impulse/restitution.py", "point.impact_restitution[i] = e if",
+        "impulse/impact_points.py", "point.impact_restitution[i] = e if",
         "point.impact_restitution[i] = 0.99 * e if", "impulse/test_impulses.py",
+    ),
+    "curvature of a contact": Fault(
+        "impulse/contact_rows.py", "point.bend[i] = bend if touches",
+        "point.bend[i] = 0.9 * bend if touches", "test_truths.py",
     ),
     "speed of pushing out": Fault(
         "impulse/sweep.py", "overlapping = max(rate * separation, -MAX_PUSH_OUT_SPEED)",

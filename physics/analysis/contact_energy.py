@@ -29,6 +29,7 @@ from physics.compiler.jit import LANES, at, factory, large_entry
 from physics.impulse.contact_rows import make_contact_rows
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
+from physics.model.state import QUERY
 from physics.motion.kinematics import make_kinematics, write_drive_frames, write_static_frames
 from physics.spring.contact_loop import REPORT
 from physics.spring.contacts import make_half_pair
@@ -67,7 +68,7 @@ def _make_elastic_energy(features: Features) -> Any:
                 if impulse:
                     half_pair(model, state, workspace, g, k, lane.updates_memory, 1.0)
                 else:
-                    half_pair(model, state, workspace, rows, g, k, 0.0)
+                    half_pair(model, state, workspace, rows, g, k, 0.0, QUERY)
                 stiffness, first_row = pair.stiffness, pair.first_slot
                 for n in range(live.slots):
                     for i in range(LANES):

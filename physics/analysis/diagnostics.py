@@ -12,7 +12,7 @@ from physics.impulse.contact_rows import make_contact_rows
 from physics.model.contacts import Contacts
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
-from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, State
+from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, QUERY, State
 from physics.model.tables import Model
 from physics.model.workspace import Workspace
 from physics.motion.kinematics import make_kinematics, write_drive_frames, write_static_frames
@@ -67,7 +67,7 @@ def _make_report(features: Features) -> Any:
                     # the impulse of one second is the force
                     half_pair(model, state, workspace, 0, k, workspace.lane[0].updates_memory, 1.0)
                 else:
-                    half_pair(model, state, workspace, rows, 0, k, 0.0)
+                    half_pair(model, state, workspace, rows, 0, k, 0.0, QUERY)
 
     return report
 

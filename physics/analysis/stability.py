@@ -56,7 +56,7 @@ def normal_load(half_pair: Any, dashpot: bool, h: float, parts: Any = 1.0) -> An
         x = 2.0 * damping * h * math.sqrt(k / m)
         phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)
         return 2.0 * damping * critical * h * phi + 0.5 * h * h * k
-    # of a contact that lasts, see normal_damping.rest_speed
+    # of a contact that lasts, see normal_damping.rest_time
     c = 2.0 * REST_DAMPING * critical if damping > 0.0 else 0.0
     x = h * c / m
     phi = (1.0 + 0.5 * x) / (1.0 + x + 0.5 * x * x)

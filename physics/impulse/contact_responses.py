@@ -44,7 +44,7 @@ def make_set_responses(features):
         """`first`: row of the half-pair's first contact."""
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
         stiffness, damping, frictions = constants.stiffness, constants.damping, constants.friction
-        floors, lacking, scale = constants.rest_speed, search.lacking, search.scale
+        lacking, scale = search.lacking, search.scale
         radii, has_faces = constants.radius, constants.kind != PLANE
         for n in range(points.shape[0]):
             point, row = points[n], rows[first + n]
@@ -55,10 +55,9 @@ def make_set_responses(features):
                 ux, uy, uz = relative_velocity(owner, surface, point, i)
                 un = ux * nx + uy * ny + uz * nz
                 a, rate = soft_response(at(stiffness, i), at(damping, i), h, weight)
-                apart = separation > 0.0
-                approach = un + target_approach(separation, rate, 1.0 / h)
-                # what is about to collide must arrive at its full speed
-                solved = (weight > 0.0) & ((not apart) | (un >= -at(floors, i)))
+                rises = un + point.bend[i]
+                approach = rises + target_approach(separation, rate, 1.0 / h)
+                solved = (weight > 0.0) & (point.arrives[i] == 0.0)
                 deep = has_faces & (weight > 0.0) & (separation < -at(radii, i))
                 search.deep[i] = 1 if deep else search.deep[i]
                 row.pressing[i] = a if solved else 0.0

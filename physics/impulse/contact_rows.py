@@ -2,10 +2,30 @@
 
 The rows of all half-pairs are prepared before the sweeps, because an impulse at one point changes
 the velocities at the others. (The spring law needs a contact point only once.)
+
+The separation s of a curved contact does not change at u n, with the present normal n. A ball that
+follows a ring of radius R at speed v has u n = -+ v^2 h / 2R half a step before and after its
+present position, while s stays constant. Over a drift of h
+
+    s after - s before = h u n + h b,    s now - s last = h u n - h b,    b = h (d^2s/dt^2) / 2,
+
+where d^2s/dt^2 is what points that move without acceleration would have. The second formula gives b
+from the last drift, the first predicts the next one with it. Without b the impulse of a moving
+contact on a curved surface is wrong by half of m v^2/R. It is not known, and counts as 0, in the
+first step of a contact, where a sample changes the face, and where a step turns a solid, or the
+direction in which the contact moves, by more than a radian: |b| is at most half of the speed times
+that angle.
+
+A contact is at rest if it closes by no more than the speed that its load gives it in a short time,
+`HALF_PAIR.rest_time`. The load is what pressed the contact in the last step, or what made it close
+faster; what the known forces would do, where the last step isn't known. Bodies that fall freely
+side by side have none, and an edge that a block rocks down onto has little.
 """
 
+import math
+
 from physics.collision.compound_frames import mark_hidden_faces
-from physics.collision.contact_point import HIDDEN, make_touch
+from physics.collision.contact_point import HIDDEN, TOUCH_TOLERANCE, make_touch
 from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_pose
 from physics.collision.surface_kinds import by_surface_kind, present_kinds
@@ -24,7 +44,8 @@ def make_find_points(features, kind):
     The surface is of one kind; candidates remember the face of it that they touch.
     """
     hides, has_faces = kind == BOX and features.compound, kind in (BOX, CYLINDER)
-    touch, FACE = make_touch(features, kind), contact_memory(features).face
+    touch, memory_rows = make_touch(features, kind), contact_memory(features)
+    FACE, SEPARATION = memory_rows.face, memory_rows.separation
 
     @stage
     def find_points(slots, candidate, relative, constants, updates_memory, points):
@@ -45,7 +66,10 @@ def make_find_points(features, kind):
                 weight = row.weight[i]
                 if hides:
                     weight = 0.0 if face == HIDDEN else weight
+                last = memory[SEPARATION, i]
+                known = last != 0.0
                 if has_faces:
+                    known = known & (face == memory[FACE, i])
                     face = face if weight > 0.0 else 0.0
                     memory[FACE, i] = face if updates_memory[i] != 0 else memory[FACE, i]
                 point.normal[0, i] = nx
@@ -55,26 +79,48 @@ def make_find_points(features, kind):
                 point.arm[1, i] = y
                 point.arm[2, i] = z
                 point.separation[i] = -penetration
+                point.last_bend[i] = last if known else math.inf
                 point.weight[i] = weight
 
     return find_points
 
 
+@stage
+def resolved(owner, surface, point, i, h, bend):
+    """Whether a step of h s turns neither the solids nor their path by more than a radian."""
+    v, u, p, w = owner.velocity, surface.velocity, owner.angular_velocity, surface.angular_velocity
+    a, b = point.arm, point.surface_arm
+    x, y, z = v[0, i] - u[0, i], v[1, i] - u[1, i], v[2, i] - u[2, i]
+    spin = p[0, i] * p[0, i] + p[1, i] * p[1, i] + p[2, i] * p[2, i]
+    turn = w[0, i] * w[0, i] + w[1, i] * w[1, i] + w[2, i] * w[2, i]
+    square = x * x + y * y + z * z
+    square += spin * (a[0, i] * a[0, i] + a[1, i] * a[1, i] + a[2, i] * a[2, i])
+    square += turn * (b[0, i] * b[0, i] + b[1, i] * b[1, i] + b[2, i] * b[2, i])
+    return (4.0 * bend * bend <= square) & (h * h * max(spin, turn) <= 1.0)
+
+
 @cached_by_features
 def make_prepare(features):
-    """Stage that writes the rows of a half-pair whose points `find_points` has found."""
+    """Stage that writes the rows of a half-pair whose points `find_points` has found.
+
+    That has left the separation of the last step, or inf, in `last_bend`.
+    """
     friction, resistance, compound = features.friction, features.resistance, features.compound
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
-    SHEAR, TWIST = memory_rows.shear, memory_rows.twist
+    SHEAR, TWIST, BEND = memory_rows.shear, memory_rows.twist, memory_rows.bend
+    APPROACH = memory_rows.approach
 
     @stage
-    def prepare(slots, candidate, owner, surface, frame, A, B, constants, h, points):
+    def prepare(slots, candidate, owner, surface, frame, A, B, constants, h, drifted, points):
         """Writes rows with the impulses of the last step as the first guess.
 
         `frame` describes the surface; remembered vectors are in the frame of its solid. `h` is the
-        time in s over which the impulses of a step act.
+        time in s over which the impulses of a step act; `drifted` [LANES]: see LANE.
         """
+        F, E, rest_times, per_h = owner.force, surface.force, constants.rest_time, 1.0 / h
+        rest_speeds = constants.rest_speed
+        inverse_mass, other = constants.owner_inverse_mass, constants.surface_inverse_mass
         G = frame.rotation if compound else surface.rotation
         Q, a, b = surface.rotation, owner.position, surface.position
         pair_mass = constants.pair_mass
@@ -98,6 +144,27 @@ def make_prepare(features):
                 point.surface_arm[0, i] = bx
                 point.surface_arm[1, i] = by
                 point.surface_arm[2, i] = bz
+                ux, uy, uz = relative_velocity(owner, surface, point, i)
+                un = ux * nx + uy * ny + uz * nz
+                last, moves = point.last_bend[i], drifted[i] > 0
+                # with an infinite value the difference is not used
+                bend = un - per_h * (point.separation[i] - last)
+                known = (last < math.inf) & resolved(owner, surface, point, i, h, bend)
+                bend = bend if known else 0.0
+                kept = memory[BEND, i] if drifted[i] == 0 else 0.0
+                bend = bend if moves else kept
+                # only what touches may be pressed by it: a gap may never close
+                touches = (point.separation[i] <= 0.0) | (memory[NORMAL, i] > 0.0)
+                point.bend[i] = bend if touches else max(bend, 0.0)
+                point.last_bend[i] = bend if moves else 0.0
+                ma, mb = at(inverse_mass, i), at(other, i)
+                along = F[0, i] * nx + F[1, i] * ny + F[2, i] * nz
+                back = E[0, i] * nx + E[1, i] * ny + E[2, i] * nz
+                along = ma * along - (mb * back if mb > 0.0 else 0.0)
+                known = known & moves
+                point.rest_speed[i] = per_h * (-un - memory[APPROACH, i]) if known else -along
+                point.approach[i] = -un
+                point.relaxed[i] = 0.0
                 normal_impulse = h * memory[NORMAL, i]
                 point.normal_impulse[i] = normal_impulse
                 point.normal_impact[i] = 0.0
@@ -113,7 +180,6 @@ def make_prepare(features):
                     point.tangential_impulse[1, i] = py
                     point.tangential_impulse[2, i] = pz
                     gx, gy, gz = gx + px, gy + py, gz + pz
-                    ux, uy, uz = relative_velocity(owner, surface, point, i)
                     sx, sy, sz = rotated(
                         Q, i, memory[SHEAR, i], memory[SHEAR + 1, i], memory[SHEAR + 2, i]
                     )
@@ -141,6 +207,11 @@ def make_prepare(features):
                 point.extra_impulse[2, i] = -gz
             for i in range(LANES):
                 effective_masses(point, i, A, B, 1.0 / at(pair_mass, i))
+            for i in range(LANES):
+                load = max(point.rest_speed[i], memory[NORMAL, i] / point.mass[i])
+                rest_speed = max(at(rest_times, i) * load, per_h * TOUCH_TOLERANCE)
+                # at an impact and after it the last step says nothing
+                point.rest_speed[i] = at(rest_speeds, i) if drifted[i] < 0 else rest_speed
 
     return prepare
 
@@ -179,7 +250,8 @@ def make_contact_rows(features):
                 constants.kind, model, k, slots, candidate, relative, constants, updates_memory,
                 points,
             )  # fmt: skip
-        prepare(slots, candidate, owner, surface, frame, A, B, constants, h, points)
+        drifted = workspace.lane[0].drifted
+        prepare(slots, candidate, owner, surface, frame, A, B, constants, h, drifted, points)
 
     return contact_rows
 

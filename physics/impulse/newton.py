@@ -30,7 +30,7 @@ from physics.impulse.newton_step import (
     set_changes,
 )
 from physics.impulse.point_impulses import apply_impulse, operands_of, relative_velocity
-from physics.impulse.sweep import anchor_kept
+from physics.impulse.sweep import anchor_kept, arrives
 from physics.model.features import cached_by_features
 
 # per substep, at most
@@ -38,16 +38,21 @@ ITERATIONS = 16
 
 
 @stage
-def mark_separating(pair, constants, separates):
-    """Marks worlds in which solids that press on each other separate, after a push apart."""
+def mark_separating(pair, separates):
+    """Marks worlds in which solids that press on each other separate, after a push apart.
+
+    Also marks the points that are about to collide.
+    """
     points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
-    floors = constants.rest_speed
     for n in range(points.shape[0]):
         point = points[n]
         for i in range(LANES):
             ux, uy, uz = relative_velocity(owner, surface, point, i)
             un = ux * point.normal[0, i] + uy * point.normal[1, i] + uz * point.normal[2, i]
-            found = (point.normal_impulse[i] > 0.0) & (un > ACCURACY * at(floors, i))
+            un -= point.last_bend[i]
+            point.arrives[i] = arrives(point, i, un)
+            found = (point.normal_impulse[i] > 0.0) & (point.relaxed[i] == 0.0)
+            found = found & (un > ACCURACY * point.rest_speed[i])
             separates[i] = 1 if found else separates[i]
 
 
@@ -59,7 +64,7 @@ def find_separating(model, workspace):
         moves[i] = 0
     for k in range(model.half_pair.shape[0]):
         if workspace.half_pair[k].slots > 0:
-            mark_separating(operands_of(model, workspace, k), model.half_pair[k], moves)
+            mark_separating(operands_of(model, workspace, k), moves)
     for i in range(LANES):
         count += moves[i]
     return count

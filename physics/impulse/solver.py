@@ -26,6 +26,7 @@ from physics.constraints.joint_velocities import (
     make_hold,
 )
 from physics.impulse.contact_rows import make_contact_rows
+from physics.impulse.impact_points import lag_of
 from physics.impulse.newton import find_separating, make_newton
 from physics.impulse.point_impulses import (
     add_opposite,
@@ -37,8 +38,9 @@ from physics.impulse.point_impulses import (
 from physics.impulse.restitution import make_find_all_impacts, make_impacts
 from physics.impulse.sweep import make_sweep
 from physics.model.contact_memory import contact_memory
-from physics.model.features import EULER, cached_by_features
+from physics.model.features import cached_by_features
 from physics.model.lanes import all_update, record_first_contact, update_previous
+from physics.model.workspace import HAS_MET
 from physics.motion.drives import make_finger_velocity_coupling
 from physics.motion.vectors import rotated_back, tensor_times
 
@@ -105,6 +107,8 @@ def make_store_forces(features):
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
     SHEAR, TWIST = memory_rows.shear, memory_rows.twist
+    SEPARATION, BEND = memory_rows.separation, memory_rows.bend
+    APPROACH = memory_rows.approach
 
     @stage
     def store_forces(pair, candidate, updates_memory, h, normal_force_sum):
@@ -124,6 +128,13 @@ def make_store_forces(features):
                 fz = extra[2, i] + size * normal[2, i]
                 normal_force_sum[i] += per_h * (size + point.normal_impact[i])
                 memory[NORMAL, i] = per_h * size if updates else memory[NORMAL, i]
+                exists = row.weight[i] > 0.0  # an empty slot stays empty
+                separation = point.separation[i] if exists else 0.0
+                bend, approach = point.bend[i], point.approach[i]
+                bend, approach = bend if exists else 0.0, approach if exists else 0.0
+                memory[SEPARATION, i] = separation if updates else memory[SEPARATION, i]
+                memory[BEND, i] = bend if updates else memory[BEND, i]
+                memory[APPROACH, i] = approach if updates else memory[APPROACH, i]
                 impact = per_h * point.normal_impact[i]
                 bx, by, bz = rotated_back(
                     Q,
@@ -187,12 +198,12 @@ def make_impulses(features):
     sweep, warm_start = make_sweep(features), make_warm_start(features)
     store_forces, find_all_impacts = make_store_forces(features), make_find_all_impacts(features)
     joints, solves_together = features.joints, features.newton
+    timed = features.finds_impacts
     newton = make_newton(features)
     couple_finger_velocities = make_finger_velocity_coupling(features)
     begin_hold, hold = make_begin_hold(features), make_hold(features)
     clear_hold, end_hold = make_clear_hold(features), make_end_hold(features)
-    # steps by which velocities lag positions; with semi-implicit Euler they are of the same time
-    lag = 0.0 if features.integrator == EULER else 0.5
+    lag = lag_of(features)
 
     @stage
     def sweep_all(model, workspace, h, soft):
@@ -203,6 +214,15 @@ def make_impulses(features):
                 couple_finger_velocities(model, workspace)
         lane = workspace.lane[0]
         hold(model, workspace, lane.in_contact, h if soft else 0.0, lane)
+
+    @stage
+    def mark_drifted(workspace, drifted):
+        """Writes LANE.drifted."""
+        lane = workspace.lane[0]
+        for i in range(LANES):
+            lane.drifted[i] = 1 if drifted > 0.0 else 0
+            if timed and drifted > 0.0 and workspace.clock[0].phase[i] == HAS_MET:
+                lane.drifted[i] = -1
 
     @stage
     def find_lanes_in_contact(model, workspace):
@@ -238,15 +258,16 @@ def make_impulses(features):
         if candidates == 0:
             return
         find_lanes_in_contact(model, workspace)
+        mark_drifted(workspace, drifted)
         rotate_inertia(model, workspace)
         for k in range(half_pairs):
             if workspace.half_pair[k].slots > 0:
                 contact_rows(model, state, workspace, g, k, workspace.lane[0].updates_memory, h)
         if joints:
-            find_all_impacts(model, workspace, h, True)
+            find_all_impacts(model, workspace, h, True, 0.0)
         # velocities are half a step old; bodies collide with the present ones
         apply_known_forces(model, workspace, lag * drifted)
-        impacts(model, workspace, h, drifted == 0.0)
+        impacts(model, workspace, h, drifted == 0.0, lag if drifted > 0.0 else 0.0)
         apply_known_forces(model, workspace, -lag * drifted)
         clear_hold(model, workspace)
         begin_hold(model, workspace, False, 0.0)

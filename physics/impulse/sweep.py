@@ -54,6 +54,12 @@ def target_approach(separation, rate, per_h):
 
 
 @stage
+def arrives(point, i, rate):
+    """1 for a point that closes its gap fast enough to collide, else 0; `rate` in m/s."""
+    return 1.0 if (point.separation[i] > 0.0) & (rate < -point.rest_speed[i]) else 0.0
+
+
+@stage
 def anchor_kept(h, slides):
     """Factor of an anchor in a step."""
     return 0.0 if slides else 1.0 - h * ANCHOR_DECAY
@@ -99,20 +105,21 @@ def make_sweep(features):
         With Newton's method only worlds with `moves` are corrected.
         """
         points, owner, surface = pair.points, pair.owner[0], pair.surface[0]
-        frictions, floors = constants.friction, constants.rest_speed
+        frictions = constants.friction
         stiffness, damping = constants.sweep_stiffness, constants.sweep_damping
         rolling, spinning = constants.rolling, constants.spinning
         per_h = 1.0 / h
         for n in range(points.shape[0]):
             point = points[n]
             for i in range(LANES):
-                mu, floor = at(frictions, i), at(floors, i)
+                mu = at(frictions, i)
                 a, rate = soft_response(at(stiffness, i), at(damping, i), h, point.weight[i])
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 separation, weight = point.separation[i], point.weight[i]
                 m, before = point.mass[i], point.normal_impulse[i]
                 ux, uy, uz = relative_velocity(owner, surface, point, i)
-                un = ux * nx + uy * ny + uz * nz
+                un = ux * nx + uy * ny + uz * nz  # then with curvature: the separation rate
+                un += point.bend[i] if soft else -point.last_bend[i]
                 apart = separation > 0.0
                 bias = separation * per_h if apart else 0.0
                 mass, leak = m, 0.0
@@ -121,9 +128,15 @@ def make_sweep(features):
                     leak = m / (m + a) if yields else 0.0
                     mass = a * leak if yields else m
                     bias = target_approach(separation, rate, per_h)
-                # what is about to collide must arrive at its full speed
-                bias = -un if apart & (un < -floor) else bias
-                new = max(before - mass * (un + bias) - leak * before, 0.0)
+                # What is about to collide must arrive at its full speed. The speed that forces give
+                # within a step isn't that of a collision
+                least = 0.0
+                if not soft:
+                    point.arrives[i] = arrives(point, i, un)
+                    # after a collision solids separate, but not because they were pushed apart
+                    least = before if point.relaxed[i] != 0.0 else 0.0
+                new = max(before - mass * (un + bias) - leak * before, least)
+                new = before if point.arrives[i] != 0.0 else new
                 new = new if weight > 0.0 else 0.0
                 if newton:
                     new = new if moves[i] != 0 else before

@@ -208,8 +208,9 @@ def make_batch_forces(features):
 
     @sequence
     def batch_forces(
-        all_model, state, workspace, crowd, pairs, b, h, elapsed, starts_collision_step, remembers
-    ):
+        all_model, state, workspace, crowd, pairs, b, h, refresh, elapsed, starts_collision_step,
+        remembers,
+    ):  # fmt: skip
         kind = crowd.pair_kind[pairs.kind[b]]
         model = bundle(model_of(all_model, kind))
         mine = bundle(workspace_of(workspace, pairs, kind, b, workspace.contact_row, 0, 0))
@@ -227,7 +228,7 @@ def make_batch_forces(features):
                 one.partners, two.partners = 2, 2  # or more
                 pair_normal(model, mine, last)
                 pair_parts(model, mine, last)
-            contacts(model, own, mine, 0, h, elapsed)
+            contacts(model, own, mine, 0, h, refresh, elapsed)
             if remembers:
                 record_first_touch(mine, state.world[0].time + elapsed)
             for i in range(LANES):

@@ -33,6 +33,7 @@ from physics.manybody.impulse_batches import (
     make_warm_batch,
 )
 from physics.manybody.spring_steps import REFRESH, RESUME, STEP
+from physics.manybody.tables import IMPACTS
 from physics.manybody.team import Team, share, takes_batch, wait
 from physics.model.features import EULER, Features
 from physics.model.state import STARTS_ANEW
@@ -122,6 +123,7 @@ def make_impulse_steps(features: Features):
                         hold_joints(model, state, workspace, crowd, g, h, drifted)
                     for m in blocks_of(crowd, g):
                         write_tensors(crowd, m)
+            whole = -1 if meets or crowd.path[IMPACTS] > 0.0 else 1 if drifted > 0.0 else 0
             wait(team)
             if thread == 0:
                 progress[3] = place_rows(crowd, pairs)
@@ -136,18 +138,19 @@ def make_impulse_steps(features: Features):
                 b = crowd.order[n]
                 if takes_batch(n, team) and pairs.busy[b] != 0:
                     prepare_batch(
-                        model, state, workspace, rows, crowd, pairs, b, span, remembers, meets
-                    )
+                        model, state, workspace, rows, crowd, pairs, b, span, remembers, meets,
+                        whole,
+                    )  # fmt: skip
             wait(team)
             if joints:  # see `restitution.make_find_impacts`
-                find(model, workspace, rows, crowd, pairs, span, team, stamp, True)
+                find(model, workspace, rows, crowd, pairs, span, team, stamp, True, 0.0)
             # velocities are half a step old; bodies collide with the present ones
             for g in range(first, last):
                 for m in blocks_of(crowd, g):
                     change_velocities(crowd, m, lagging)
             wait(team)
             stamp, collided = collide(
-                model, workspace, rows, crowd, pairs, span, drifted == 0.0, team, stamp
+                model, workspace, rows, crowd, pairs, span, drifted == 0.0, lagging / h, team, stamp
             )
             if collided:
                 end_joints(model, workspace, crowd, span if refresh else 0.0, team)

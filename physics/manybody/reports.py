@@ -19,6 +19,7 @@ from physics.manybody.batches import (
 )
 from physics.manybody.impulse_batches import gather_tensors
 from physics.model.features import Features
+from physics.model.state import QUERY
 from physics.motion.vectors import rotated
 from physics.scene.shapes import PLANE
 from physics.spring.contacts import make_half_pair
@@ -105,7 +106,7 @@ def make_touching(features: Features) -> Any:
                 if impulse:  # the impulse of one second is the force
                     half_pair(model, own, mine, 0, k, workspace.lane[0].updates_memory, 1.0)
                 else:
-                    half_pair(model, own, mine, arrays.rows, 0, k, 0.0)
+                    half_pair(model, own, mine, arrays.rows, 0, k, 0.0, QUERY)
                 live.first_row = kept
                 frame, owner = workspace.solid[constants.frame], workspace.solid[constants.owner]
                 surface = workspace.solid[constants.surface]

@@ -20,7 +20,7 @@ from physics.manybody.blocks import (
 )
 from physics.manybody.team import FAR, Team, share, takes_batch, total, wait
 from physics.model.features import EULER, Features
-from physics.model.state import STARTS_ANEW
+from physics.model.state import BEGINS, QUERY, STARTS_ANEW
 from physics.spring.mass_splitting import splits_mass
 
 # what a call continues with, see `make_spring_steps`
@@ -33,7 +33,7 @@ def make_spring_steps(features: Features):
     move_group, place_group = make_move_group(features), make_place_group(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     batch_forces, end_step = make_batch_forces(features), make_end_step(features)
-    splits = splits_mass(features)
+    splits, dashpot = splits_mass(features), features.dashpot
     before = 1.0 if features.integrator == EULER else 0.5
 
     @large_entry
@@ -69,6 +69,10 @@ def make_spring_steps(features: Features):
                 wait(team)
             step = 0.0 if phase == REFRESH else h
             elapsed = done * h + step
+            # see `spring.contacts`; a query is a refresh before no step
+            begins = substeps > 0 and not dashpot
+            span = before * h if phase == REFRESH and begins else step
+            refresh = 0 if phase != REFRESH else BEGINS if begins else QUERY
             # new forces alone change nothing that contacts remember
             remembers = phase != REFRESH or progress[6] == STARTS_ANEW
             starts = phase != REFRESH and done > 0 and done % collision_substeps == 0
@@ -76,8 +80,9 @@ def make_spring_steps(features: Features):
                 if takes_batch(n, team):
                     b = crowd.order[n]
                     batch_forces(
-                        model, state, workspace, crowd, pairs, b, step, elapsed, starts, remembers
-                    )
+                        model, state, workspace, crowd, pairs, b, span, refresh, elapsed, starts,
+                        remembers,
+                    )  # fmt: skip
             wait(team)
             for g in range(first, last):
                 known_forces(model, workspace, crowd, g, step)

@@ -27,6 +27,7 @@ from physics.model.tables import (
     HIDDEN_FACE,
     Model,
 )
+from physics.scene.drives import Drive
 from physics.scene.fidelity import INTEGRATORS, TIME_CONTROLS, Fidelity
 from physics.scene.fields import PointSpring, SurfaceDrag
 from physics.scene.flush_statics import FlushBox
@@ -217,13 +218,14 @@ def _half_pair_rows(layout: Layout) -> tuple[Array, Array]:
         row["keeps_all"] = any(isinstance(getattr(s, "shape", None), Mesh) for s in ends)
         row["crowding"] = half_pair.crowding
         row["axial"] = half_pair.samples.axial
-        row["slide_slope"] = 1.0
+        row["slide_slope"] = np.inf
+        row["driven"] = any(isinstance(solid, Drive) for solid in ends)
         row["impact_tolerance"] = layout.fidelity.impact_tolerance
         for sign, body, other in ((1.0, owner, surface), (-1.0, surface, owner)):
-            if body < layout.bodies and other >= layout.dynamic_count:
+            if body < layout.bodies <= other:
                 row["gravity"] = sign * layout.gravity
-                if layout.rolls[body]:
-                    row["slide_slope"] = layout.modes[body, 1]
+                if other >= layout.dynamic_count:
+                    row["slide_slope"] = layout.modes[body, 1] if layout.rolls[body] else 1.0
         if any(isinstance(solid, Body) for solid in ends):  # nothing else rotates
             for name in ("rolling", "spinning"):
                 resistances = [getattr(solid.material, f"{name}_resistance") for solid in ends]
@@ -273,6 +275,7 @@ def _features(
     slope = any(
         np.any(row["gravity"][:2]) or (row["kind"] != PLANE and np.any(row["gravity"]))
         for row in model.half_pair
+        if row["slide_slope"] < np.inf
     )
     return Features(
         integrator=INTEGRATORS.index(fidelity.integrator),

@@ -6,7 +6,7 @@ half-pairs, so a world's numbers are bitwise the same however many are computed 
 
 import numpy as np
 
-from physics.model.normal_damping import damping_coefficients, damping_errors, rest_speed
+from physics.model.normal_damping import damping_coefficients, damping_errors, rest_time
 from physics.model.pairs import Layout, pair_stiffness
 from physics.model.tangential import SHEAR_RATIO, shear_ratio, tangential_coefficients
 from physics.scene.compound import Compound
@@ -124,14 +124,14 @@ def contact_columns(
         sweep_damping = 2.0 * SOFT_DAMPING * np.sqrt(sweep_stiffness * pair_mass)
         damping = stiffness * h * (1.0 / CLOSING - 1.0) if newton else sweep_damping
         damping_error = np.zeros(stiffness.shape)
-        slowest = np.full(stiffness.shape, REST_STEPS * g * h)
+        span = np.full(stiffness.shape, REST_STEPS * h)
     else:
         floor = _SLIM_RESTITUTION * fidelity.contact_resolution * (1.0 - soft)
         reached = np.maximum(restitution, floor)
         damping = damping_coefficients(reached, fidelity.damping)
         damping_error = damping_errors(reached, damping, fidelity.damping)
         sweep_stiffness, sweep_damping = stiffness, np.zeros(stiffness.shape)
-        slowest = rest_speed(damping, g, np.sqrt(stiffness / pair_mass))
+        span = rest_time(damping, np.sqrt(stiffness / pair_mass))
     return {
         "stiffness": stiffness,
         "damping": damping,
@@ -139,7 +139,8 @@ def contact_columns(
         "sweep_damping": sweep_damping,
         "damping_error": damping_error,
         "restitution": restitution,
-        "rest_speed": slowest,
+        "rest_time": span,
+        "rest_speed": span * g,
         "pair_mass": pair_mass,
         "shear_stiffness": shear_stiffness,
         "shear_damping": shear_damping,

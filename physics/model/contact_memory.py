@@ -11,7 +11,7 @@ from physics.model.features import Features, cached_by_features
 
 ROWS = {
     "normal_force": 1, "impact_speed": 1, "approach": 1, "shear": 3, "tangential_force": 3,
-    "twist": 3, "face": 1,
+    "twist": 3, "face": 1, "separation": 1, "bend": 1,
 }  # fmt: skip
 
 
@@ -22,13 +22,15 @@ class ContactMemory(NamedTuple):
         size: rows in all.
         normal_force: 1 row, N, of the last step.
         impact_speed: 1 row, m/s, see `hunt_crossley_force`. Spring law.
-        approach: 1 row, m/s, in the last step. Spring law.
+        approach: 1 row, m/s, in the last step.
         shear: 3 rows. Spring law: N, force of the tangential spring. Impulse law: m, of the anchor.
         tangential_force: 3 rows, N, of the last step, in the surface's frame. Impulse law.
         twist: 3 rows. Spring law: N m, of the spring against rolling and spinning. Impulse law:
             N m, torque of the last step.
         face: 1 row, the face of a box or cylinder through which the sample came in, see
             `box_distance`.
+        separation: 1 row, m, of the last step; 0: not known. Impulse law.
+        bend: 1 row, m/s, see `impulse.contact_rows`. Impulse law.
     """
 
     size: int
@@ -39,6 +41,8 @@ class ContactMemory(NamedTuple):
     tangential_force: int = -1
     twist: int = -1
     face: int = -1
+    separation: int = -1
+    bend: int = -1
 
 
 @cached_by_features
@@ -48,11 +52,13 @@ def contact_memory(features: Features) -> ContactMemory:
     present = {
         "normal_force": True,
         "impact_speed": not features.impulse,
-        "approach": not features.impulse,
+        "approach": True,
         "shear": coulomb,
         "tangential_force": coulomb and features.impulse,
         "twist": features.resistance,
         "face": features.box or features.cylinder,
+        "separation": features.impulse,
+        "bend": features.impulse,
     }
     size, first = 0, {}
     for name, rows in ROWS.items():

@@ -25,6 +25,16 @@ CONTACT_ROW = np.dtype(
         ("surface_arm", "f8", (3, LANES)),  # m, from the surface's centre
         ("separation", "f8", (LANES,)),  # m, negative if they overlap
         ("weight", "f8", (LANES,)),
+        # m/s that curvature adds to the separation rate: over the next drift, and, taken from it,
+        # over the last one, see impulse/contact_rows.py
+        ("bend", "f8", (LANES,)),
+        ("last_bend", "f8", (LANES,)),
+        ("approach", "f8", (LANES,)),  # m/s, in the last drift
+        ("rest_speed", "f8", (LANES,)),  # m/s, closing speed up to which it counts as at rest
+        # 1: what pushed its solids apart in the last step has been removed before a collision
+        ("relaxed", "f8", (LANES,)),
+        # 1: closes the gap so fast, before the step's forces, that it is left to collide
+        ("arrives", "f8", (LANES,)),
         ("mass", "f8", (LANES,)),  # kg, effective mass along the normal
         ("shear_mass", "f8", (LANES,)),  # kg, smallest effective mass across it
         ("normal_impulse", "f8", (LANES,)),  # N s
@@ -36,9 +46,16 @@ CONTACT_ROW = np.dtype(
         ("extra_angular_impulse", "f8", (3, LANES)),  # N m s
         ("anchor", "f8", (3, LANES)),  # m, creep since the point came to stick
         # of an instantaneous collision
-        ("impact_restitution", "f8", (LANES,)),  # -1 where nothing collides
+        ("impact_restitution", "f8", (LANES,)),  # -1 where it takes no part
+        ("collides", "f8", (LANES,)),  # 1, or 0
+        ("impact_target", "f8", (LANES,)),  # m/s, separation rate that compression ends with
         ("normal_impact", "f8", (LANES,)),  # N s
         ("tangential_impact", "f8", (3, LANES)),  # N s
+        ("half_impulse", "f8", (3, LANES)),  # N s, of the half step before a collision
+        # of compression alone, and the least normal impulse after restitution
+        ("compression", "f8", (LANES,)),  # N s
+        ("tangential_compression", "f8", (3, LANES)),  # N s
+        ("least_impact", "f8", (LANES,)),  # N s
     ],
     align=True,
 )

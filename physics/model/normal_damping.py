@@ -100,13 +100,14 @@ def damping_errors(restitution: Array, damping: Array, law: str) -> Array:
     return np.where(bounces, (1.0 - e * e) * out * back / slope, 1.0 / 12.0)
 
 
-def rest_speed(damping: Array, gravity: float, omega: Array) -> Array:
-    """Lower bound of the impact speed, m/s: it damps a body at rest by REST_DAMPING.
+def rest_time(damping: Array, omega: Array) -> Array:
+    """Time in s in which the load of a contact at rest gives the lower bound of the impact speed.
+
+    That bound damps it by REST_DAMPING.
 
     Args:
         damping: coefficient of the law, of any number of contacts.
-        gravity: m/s^2.
         omega: rad/s, natural frequency of each contact.
     """
-    # at the sink g/omega^2 the damping is m g a / v; critical is 2 m omega
-    return np.maximum(damping * gravity / (2.0 * REST_DAMPING * omega), 1e-9)
+    # at the sink g/omega^2 of a load m g the damping is m g a / v; critical is 2 m omega
+    return damping / (2.0 * REST_DAMPING * omega)

@@ -50,6 +50,7 @@ FIRST_TOUCH = 1  # s, NaN before
 FIRST_POSITION = 2  # and the next two: m, position of the pair's first solid at that time
 
 STARTS_ANEW, NEW_FORCES = 1, 2  # values of STATUS.needs_refresh
+QUERY, BEGINS = 1, 2  # what a refresh is for: a question, or the step that follows
 
 # one row per world
 STATUS = np.dtype(

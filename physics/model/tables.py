@@ -57,15 +57,14 @@ HALF_PAIR = np.dtype(
         ("grid", "i8"),  # row of Model.grid that is the surface, or -1
         ("keeps_all", "i8"),  # 1: a solid is a mesh, its manifold is not reduced
         ("axial", "i8"),  # 1: the samples turn to face the surface, see `collision.facing`
+        ("driven", "i8"),  # 1: a solid is a drive
         ("face_normals", "i8"),  # 1: samples of what has faces, see `box_distance`
-        # of a body on a ground or static: gravity of the owner less that of the surface, m/s^2, in
-        # the world frame; and the slope above which it slides, over mu: more than 1 if it can roll
+        # gravity of the owner less that of the surface, m/s^2, in the world frame
         ("gravity", "f8", (3,)),
+        # slope above which a body slides on a ground or static, over mu: more than 1 if it can
+        # roll; inf of other pairs
         ("slide_slope", "f8"),
-        (
-            "crowding",
-            "f8",
-        ),  # factor on the rate at which damping relaxes, see `mesh_samples.pressed`
+        ("crowding", "f8"),  # factor on how fast damping relaxes, see `mesh_samples.pressed`
         ("core", "f8", (3,)),  # m, parameters of the surface's core
         ("owner_radius", "f8"),  # m, of the samples
         ("radius", "f8"),  # m, of the samples and the surface's rounding together
@@ -85,7 +84,10 @@ HALF_PAIR = np.dtype(
         ("sweep_damping", "f8"),
         ("damping_error", "f8"),  # relative, per (omega h)^2, see normal_damping.py
         ("restitution", "f8"),
-        ("rest_speed", "f8"),  # m/s, lower bound of the impact speed
+        # s in which the load of a contact gives it the closing speed that counts as rest: the lower
+        # bound of the impact speed, or with impulses the fastest approach that is no collision
+        ("rest_time", "f8"),
+        ("rest_speed", "f8"),  # m/s, the same of the whole weight; time control makes no cut below
         ("pair_mass", "f8"),  # kg, reduced mass
         ("owner_inverse_mass", "f8"),  # 1/kg
         ("surface_inverse_mass", "f8"),  # 1/kg; 0 for statics
@@ -120,6 +122,7 @@ HALF_PAIR_PER_WORLD = (
     "damping_error",
     "restitution",
     "rest_speed",
+    "rest_time",
     "pair_mass",
     "owner_inverse_mass",
     "surface_inverse_mass",

@@ -61,6 +61,7 @@ SOLID = np.dtype(
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
         ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
+        ("rest_speed", "f8", (LANES,)),  # m/s, lower bound of the impact speed on a plane
         ("normal_sum", "f8", (3, LANES)),  # of the samples in contact, times their weight
         # of mass splitting: n n^T summed over the solids touched in the last step, as xx yy zz xy
         # xz yz; and the number of those that can be touched
@@ -90,6 +91,7 @@ HALF_PAIR_WORK = np.dtype(
         # its mass is split, see spring/mass_splitting.py
         ("normal", "f8", (3, LANES)),
         ("parts", "f8", (LANES,)),
+        ("supported", "f8", (LANES,)),  # 1: a body of the pair touched something else, too
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count
         ("first_row", "i8"),  # into Workspace.contact_row; impulse law
@@ -113,6 +115,9 @@ LANE = np.dtype(
         ("joint_stuck", "i8", (LANES,)),  # 1: the iteration doesn't converge
         ("joint_beyond", "i8", (LANES,)),  # 1: a motor or limit is beyond its bound
         ("in_contact", "i8", (LANES,)),  # 1: has candidates; impulse law
+        # 1: the solids come from a drift over a whole substep; -1: they are at an impact, or one
+        # was in the substep; 0: a refresh; impulse law
+        ("drifted", "i8", (LANES,)),
         # of instantaneous collisions, see impulse/restitution.py
         ("colliding", "i8", (LANES,)),
         ("unconverged", "i8", (LANES,)),  # 1: needs another sweep
@@ -121,7 +126,8 @@ LANE = np.dtype(
         ("impact_restitution", "f8", (LANES,)),  # the largest
         ("impact_work", "f8", (LANES,)),  # J, of all impact impulses
         ("compression_work", "f8", (LANES,)),  # J, of those of compression
-        ("end_work", "f8", (LANES,)),  # J, impulses times the velocities after them
+        # J, impulses since compression times the velocities after them
+        ("end_work", "f8", (LANES,)),
         ("allowed_work", "f8", (LANES,)),  # J, upper bound for restitution
         ("restitution_scale", "f8", (LANES,)),  # fraction of restitution that this bound allows
     ],

@@ -18,6 +18,9 @@ from physics.spring.energy_correction import rotational_inverse_mass
 from physics.spring.hunt_crossley import dashpot_force, hunt_crossley_force
 from physics.spring.mass_splitting import splits_mass
 
+# m/s, least lower bound of the impact speed
+LEAST_SPEED = 1e-9
+
 # one row per slot: what `World.contacts` reports of the candidates there
 REPORT = np.dtype(
     [
@@ -31,6 +34,11 @@ REPORT = np.dtype(
 )
 
 
+def weighs_on_solids(features):
+    """Whether a static's surface may bear weight in any direction; bodies and drives bear none."""
+    return not features.dashpot and (features.slope or not features.friction)
+
+
 @cached_by_features
 def make_contact_loop(features, kind, report):
     """Loop over the slots of a half-pair; with `report` it also writes a row for each candidate."""
@@ -41,6 +49,7 @@ def make_contact_loop(features, kind, report):
     plane, box, compound = kind == PLANE, kind == BOX, features.compound
     keeps_normals = not plane and splits_mass(features)
     has_faces = kind in (BOX, CYLINDER)
+    weighs = not plane and weighs_on_solids(features)
     touch = make_touch(features, kind)
     memory_rows = contact_memory(features)
     FORCE, SPEED, APPROACH = (
@@ -51,12 +60,13 @@ def make_contact_loop(features, kind, report):
     SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
 
     @stage
-    def contact_loop(slots, candidate, relative, constants, h, rows):
+    def contact_loop(slots, candidate, relative, constants, h, ahead, rows):
         R, c = relative.rotation, relative.position
         v, omega = relative.velocity, relative.angular_velocity
         force, torque, normal_force_sum = relative.force, relative.torque, relative.normal_force_sum
         radii, owner_radii, core = constants.radius, constants.owner_radius, constants.core
-        stiffness, damping, floors = constants.stiffness, relative.damping, constants.rest_speed
+        stiffness, damping, floors = constants.stiffness, relative.damping, relative.rest_speed
+        rest_times = constants.rest_time
         shear_stiffness, shear_damping = constants.shear_stiffness, constants.shear_damping
         frictions, pair_mass = constants.friction, constants.pair_mass
         mean_impact_speeds, impact_ratios = relative.mean_impact_speed, relative.impact_ratio
@@ -77,7 +87,7 @@ def make_contact_loop(features, kind, report):
                 weight, mu = weights[i], at(frictions, i)
                 radius, owner_radius = at(radii, i), at(owner_radii, i)
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
-                k, a, floor = at(stiffness, i), damping[i], at(floors, i)
+                k, a = at(stiffness, i), damping[i]
                 shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
                 share = at(overlap_share, i)
@@ -87,6 +97,10 @@ def make_contact_loop(features, kind, report):
                 )
                 if box and compound:
                     weight = 0.0 if face == HIDDEN else weight
+                floor = floors[i]
+                if weighs:
+                    load = fall[0, i] * nx + fall[1, i] * ny + fall[2, i] * nz
+                    floor = max(-at(rest_times, i) * load, floor)
                 if lever and not plane:
                     rotational = rotational_inverse_mass(
                         at(inverse_inertia[0], i),
@@ -112,12 +126,15 @@ def make_contact_loop(features, kind, report):
                     same = (face == memory[FACE, i]) | (not face_normals)
                     impact_speed = impact_speed if same else 0.0
                 begins = impact_speed == 0.0
+                # a contact without memory at the start: the mean over the coming half step
+                reached = penetration + ahead * approach if begins else penetration
                 normal, impact_speed, persistence = normal_force(
-                    penetration,
+                    reached,
                     approach,
                     k,
                     a,
                     floor,
+                    ahead > 0.0,
                     inverse_mass,
                     speed_per_load,
                     h,
@@ -130,6 +147,9 @@ def make_contact_loop(features, kind, report):
                     memory[APPROACH, i],
                     weight > 0.0,
                 )
+                if report:  # the force of the last step, whose mean it was, if there was one
+                    last, rate = memory[FORCE, i], memory[APPROACH, i]
+                    normal = last if (last != 0.0) | (rate != 0.0) else normal
                 memory[SPEED, i] = impact_speed
                 memory[FORCE, i] = normal
                 # an empty slot stays empty, whatever the lane's state

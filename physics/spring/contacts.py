@@ -1,7 +1,13 @@
 """Contact forces of the spring law: every half-pair's candidates, and the wrenches on both solids.
 
 Both solids feel opposite forces at the contact point, so momentum and angular momentum are
-conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in s, 0 in a refresh.
+conserved. Arguments: `g` is the lane group, `k` the half-pair, `h` the step in s.
+
+A step's force is the mean over the time from half a step before to half a step after it. The force
+of a state that was set from outside acts for the half step that comes, so a contact without memory
+is evaluated half of that time later. (Otherwise a ball with e = 1 that touches in its first step
+would rebound with 1 + (omega h)^2/8 of its speed.) `refresh` says what forces without a step are
+for, see `model.state`; with a query h = 0.
 """
 
 import math
@@ -12,16 +18,17 @@ from physics.collision.relative_frame import relative_gravity, relative_pose, re
 from physics.collision.surface_kinds import by_surface_kind, present_kinds
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.contact_memory import contact_memory
-from physics.model.features import cached_by_features
+from physics.model.features import EULER, cached_by_features
 from physics.model.lanes import (
     all_update,
     find_waiting,
     record_first_contact,
     update_previous,
 )
+from physics.model.state import BEGINS, QUERY
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
-from physics.spring.contact_loop import make_contact_loop
+from physics.spring.contact_loop import LEAST_SPEED, make_contact_loop, weighs_on_solids
 from physics.spring.energy_correction import make_energy_correction
 from physics.spring.mass_splitting import split_masses, splits_mass
 
@@ -40,11 +47,11 @@ def make_half_pair(features, report):
     has_plane, has_solids = PLANE in kinds, any(kind != PLANE for kind in kinds)
 
     @sequence
-    def half_pair(model, state, workspace, rows, g, k, h):
+    def half_pair(model, state, workspace, rows, g, k, h, refresh):
         if has_plane and (not has_solids or model.half_pair[k].kind == PLANE):
-            on_plane(model, state, workspace, rows, g, k, h)
+            on_plane(model, state, workspace, rows, g, k, h, refresh)
         if has_solids and (not has_plane or model.half_pair[k].kind != PLANE):
-            on_solid(model, state, workspace, rows, g, k, h)
+            on_solid(model, state, workspace, rows, g, k, h, refresh)
 
     return half_pair
 
@@ -59,10 +66,10 @@ def make_on_plane(features, report):
     begin_half_pair, loop = make_begin_half_pair(features), make_loop(features, PLANE, report)
 
     @sequence
-    def on_plane(model, state, workspace, rows, g, k, h):
+    def on_plane(model, state, workspace, rows, g, k, h, refresh):
         owner = workspace.solid[model.half_pair[k].owner]
-        begin_half_pair(model, workspace, k, h, owner)
-        loop(model, state, workspace, rows, g, k, h, owner)
+        begin_half_pair(model, workspace, k, h, refresh, owner)
+        loop(model, state, workspace, rows, g, k, h, refresh, owner)
 
     return on_plane
 
@@ -70,24 +77,24 @@ def make_on_plane(features, report):
 @cached_by_features
 def make_on_solid(features, report):
     """The same, for half-pairs whose surface is that of a solid."""
-    compound, slope = features.compound, features.slope
+    compound, weighs = features.compound, weighs_on_solids(features)
     begin_half_pair = make_begin_half_pair(features)
     loops = by_surface_kind(
         features, lambda kind: None if kind == PLANE else make_loop(features, kind, report)
     )
 
     @sequence
-    def on_solid(model, state, workspace, rows, g, k, h):
+    def on_solid(model, state, workspace, rows, g, k, h, refresh):
         constants, relative = model.half_pair[k], workspace.relative[0]
         owner, surface = workspace.solid[constants.owner], workspace.solid[constants.surface]
         # of a compound `frame` is the part that is touched, `surface` the whole that forces act on
         frame = workspace.solid[constants.frame] if compound else surface
-        begin_half_pair(model, workspace, k, h, relative)
+        begin_half_pair(model, workspace, k, h, refresh, relative)
         relative_pose(owner, frame, relative)
         relative_velocities(owner, frame, relative)
-        if slope:
+        if weighs:
             relative_gravity(frame, constants.gravity, relative)
-        loops(constants.kind, model, state, workspace, rows, g, k, h, relative)
+        loops(constants.kind, model, state, workspace, rows, g, k, h, refresh, relative)
         add_wrenches(owner, surface, frame, relative)
 
     return on_solid
@@ -100,9 +107,10 @@ def make_loop(features, kind, report):
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
     save_memory, restore_memory = make_keep_memory(features)
+    halfway = features.integrator != EULER
 
     @sequence
-    def loop(model, state, workspace, rows, g, k, h, relative):
+    def loop(model, state, workspace, rows, g, k, h, refresh, relative):
         constants, slots = model.half_pair[k], workspace.half_pair[k].slots
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
@@ -113,17 +121,18 @@ def make_loop(features, kind, report):
             grid_distances(model, k, candidate, relative)
         # The normal on a ball or capsule (`face_normals` 0) can leap from face to face of a box
         # within a step and add energy, which this removes. Before the loop, which overwrites the
-        # face that each candidate remembers. Not in a refresh, where h = 0
-        if box and constants.face_normals == 0 and h > 0.0:
+        # face that each candidate remembers. Not in a refresh, before which nothing has moved
+        if box and constants.face_normals == 0 and not refresh:
             correct_energy(slots, candidate, relative, constants, h)
         # nearly always all candidates remember this step, so the loop doesn't ask
         lane, saved = workspace.lane[0], workspace.saved_memory
-        keeps = h == 0.0 or lane.waiting != 0
+        keeps = refresh or lane.waiting != 0
         if keeps:
             save_memory(candidate, slots, saved)
-        contact_loop(slots, candidate, relative, constants, h, out)
+        ahead = 0.5 * h if halfway and refresh == BEGINS else 0.0
+        contact_loop(slots, candidate, relative, constants, h, ahead, out)
         if keeps:
-            restore_memory(candidate, slots, saved, lane.active, h)
+            restore_memory(candidate, slots, saved, lane.updates_memory, refresh)
 
     return loop
 
@@ -131,7 +140,8 @@ def make_loop(features, kind, report):
 @cached_by_features
 def make_keep_memory(features):
     """Stages that save the memory of candidates and restore it where a step doesn't count."""
-    size = contact_memory(features).size
+    memory_rows = contact_memory(features)
+    size, FORCE, SPEED = memory_rows.size, memory_rows.normal_force, memory_rows.impact_speed
 
     @stage
     def save_memory(candidate, slots, saved):
@@ -141,13 +151,21 @@ def make_keep_memory(features):
                     saved[n].memory[row, i] = candidate[n].memory[row, i]
 
     @stage
-    def restore_memory(candidate, slots, saved, active, h):
-        """In a refresh (h = 0) that is all lanes, else those that aren't active."""
+    def restore_memory(candidate, slots, saved, updates_memory, refresh):
+        """After a query that is all lanes, else those that don't update their memory.
+
+        After the half step of a state that was set contacts begin with the next step, but know
+        their rate.
+        """
         for n in range(slots):
             for row in range(size):
                 for i in range(LANES):
-                    if h == 0.0 or active[i] == 0:
+                    if refresh == QUERY or updates_memory[i] == 0:
                         candidate[n].memory[row, i] = saved[n].memory[row, i]
+            for i in range(LANES):
+                if refresh == BEGINS and updates_memory[i] != 0:
+                    candidate[n].memory[FORCE, i] = 0.0
+                    candidate[n].memory[SPEED, i] = 0.0
 
     return save_memory, restore_memory
 
@@ -158,7 +176,7 @@ def make_begin_half_pair(features):
     compound, splits = features.compound, splits_mass(features)
 
     @stage
-    def begin_half_pair(model, workspace, k, h, relative):
+    def begin_half_pair(model, workspace, k, h, refresh, relative):
         """Prepares what the samples read of their pair, see spring/hunt_crossley.py.
 
         The load rate m / (W h), with the pair mass m split as `mass_splitting` says, turns a change
@@ -168,7 +186,8 @@ def make_begin_half_pair(features):
 
         Also corrects the damping coefficient for (omega h)^2 W, see model/normal_damping.py.
 
-        h is the step. W is the sum of the weights of the samples that were in contact in the last
+        h is the step; in a refresh nothing is known of the load. W is the sum of the weights of the
+        samples that were in contact in the last
         step, over all half-pairs of the pair, and F their normal force. The results are zero where
         nothing was in contact. All of it is written to `relative`, one array, because LLVM checks
         before every run of the loop that its arrays don't overlap.
@@ -178,6 +197,10 @@ def make_begin_half_pair(features):
         other = workspace.half_pair[max(half_pair.reverse, 0)]
         pair_mass, stiffness = half_pair.pair_mass, half_pair.stiffness
         damping, errors = half_pair.damping, half_pair.damping_error
+        driven = half_pair.driven != 0
+        # of a plane; along other normals the loop finds it
+        fall = max(-half_pair.gravity[2], 0.0) if half_pair.kind == PLANE else 0.0
+        rest_time, weight_speed = half_pair.rest_time, half_pair.rest_speed
         parts = live.parts
         if compound:
             sum_of_pair(
@@ -189,7 +212,7 @@ def make_begin_half_pair(features):
             mass, spring = at(pair_mass, i), at(stiffness, i)
             # a report, in steps of 0 s, splits nothing: parts may not be written
             part = mass / max(parts[i], 1.0) if splits else mass
-            rate = part / h if h > 0.0 else 0.0
+            rate = part / h if not refresh else 0.0
             relative.inverse_mass[i] = half_pair.crowding / mass
             relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)
             if compound:  # until the loop these four fields are scratch, cleared below
@@ -207,6 +230,9 @@ def make_begin_half_pair(features):
             known = weight if weight > 0.0 else 1.0
             square = known * spring * (h * h) / mass
             square = min(square, 4.0)  # beyond it no step is stable
+            loaded = driven or (splits and live.supported[i] != 0.0)
+            slowest = at(weight_speed, i) if loaded else at(rest_time, i) * fall
+            relative.rest_speed[i] = max(slowest, LEAST_SPEED)
             relative.damping[i] = at(damping, i) * (1.0 - at(errors, i) * square)
             inverse = 1.0 / force if force > _LEAST_FORCE else 0.0
             relative.inverse_mean_force[i] = weight * inverse
@@ -290,7 +316,8 @@ def make_contacts(features):
     def contacts(model, state, workspace, g, h, drifted, elapsed):
         if splits:
             split_masses(model, workspace)
-        pair_contacts(model, state, workspace, g, h, elapsed)
+        refresh = 0 if drifted > 0.0 else BEGINS if h > 0.0 else QUERY
+        pair_contacts(model, state, workspace, g, h, refresh, elapsed)
 
     return contacts
 
@@ -306,12 +333,12 @@ def make_pair_contacts(features):
     compound, splits = features.compound, splits_mass(features)
 
     @sequence
-    def pair_contacts(model, state, workspace, g, h, elapsed):
+    def pair_contacts(model, state, workspace, g, h, refresh, elapsed):
         find_waiting(workspace.lane[0])
         for k in range(model.half_pair.shape[0]):
             live = workspace.half_pair[k]
             if live.slots > 0:
-                half_pair(model, state, workspace, (), g, k, h)
+                half_pair(model, state, workspace, (), g, k, h, refresh)
                 constants = model.half_pair[k]
                 owner, plane = workspace.solid[constants.owner], constants.kind == PLANE
                 relative = owner if plane else workspace.relative[0]

@@ -56,6 +56,7 @@ first touch.
 
 import math
 
+from physics.collision.contact_point import TOUCH_TOLERANCE
 from physics.compiler.jit import stage
 
 # A contact counts as lasting while its impact speed is at most max(a, this) * (load / m) / omega.
@@ -70,6 +71,7 @@ def hunt_crossley_force(
     k,
     a,
     floor,
+    fresh,
     inverse_mass,
     speed_per_load,
     h,
@@ -90,6 +92,8 @@ def hunt_crossley_force(
         k: N/m.
         a: damping coefficient.
         floor: m/s, lower bound of the impact speed.
+        fresh: whether the state was set from outside. A contact that it puts inside the surface is
+            no impact: it has the undamped force of its spring.
         inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
             of the effective mass at its contact point, to which rotation contributes.
         speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
@@ -117,7 +121,8 @@ def hunt_crossley_force(
     # a candidate that has just been listed has no rate of the last step
     joined = previous_approach * impact_ratio if previous_approach != 0.0 else mean_impact_speed
     # only a sample that comes through the surface joins: not one that was inside and changed face
-    joined = min(joined, mean_impact_speed) if penetration <= h * approach else 0.0
+    enters = penetration <= h * approach + TOUCH_TOLERANCE
+    joined = min(joined, mean_impact_speed) if enters else 0.0
     # after turning around it is negative while the sample approaches, and `approach` is larger
     remembered = impact_speed if approach > 0.0 else abs(impact_speed)
     speed = max(max(joined if begins else remembered, approach), floor)
@@ -131,11 +136,14 @@ def hunt_crossley_force(
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
-    x = h * k * inverse_mass * y
+    x = 0.0 if fresh & begins & (not enters) else h * k * inverse_mass * y
     numerator = k * (v * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * load
     divisor = r * r + r * x + 0.5 * x * x
-    inverse = 1.0 / (divisor * v)  # for both quotients: divisions are the expensive part
-    force = numerator * v * inverse
+    # near e = 0 any impact is slow compared with `floor`, but not with the speed that a load gives
+    fastest = max(v, abs(approach) * max(a / _CALM, 1.0))
+    # for both quotients: divisions are the expensive part
+    inverse = 1.0 / (divisor * v * fastest)
+    force = numerator * v * (fastest * inverse)
     # a sample that is apart, in reach only through b, and separates already, never touched
     touching = (reach > 0.0) & ((impact_speed != 0.0) | (approach > 0.0) | (penetration > 0.0))
     touching &= exists
@@ -143,7 +151,7 @@ def hunt_crossley_force(
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
     calm = max(floor, calm_per_load * load)
-    return force, impact_speed, min(1.0, calm * divisor * inverse)
+    return force, impact_speed, min(1.0, calm * divisor * v * inverse)
 
 
 @stage
@@ -153,6 +161,7 @@ def dashpot_force(
     k,
     zeta,
     floor,
+    fresh,
     inverse_mass,
     speed_per_load,
     h,

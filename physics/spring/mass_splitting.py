@@ -112,35 +112,41 @@ def add_normal(solid, normal, plane):
 
 
 @stage
-def add_parts(solid, inverse_mass, pair_mass, normal, plane, parts):
+def add_parts(solid, inverse_mass, pair_mass, normal, plane, parts, supported):
     """Adds what a body adds to the parts of a pair: n - 1, weighted by its inverse mass.
 
-    Exactly 0 where it touched one solid or none.
+    Exactly 0 where it touched one solid or none. Also marks pairs of bodies that touched others.
     """
     sums = solid.normals
     for i in range(LANES):
         # the number of solids, but for round-off
-        several = sums[0, i] + sums[1, i] + sums[2, i] > 1.5
+        solids = sums[0, i] + sums[1, i] + sums[2, i]
+        several = solids > 1.5
         z = normal[2, i]
         n = sums[2, i] * z * z
+        own = z * z
         if not plane:
             x, y = normal[0, i], normal[1, i]
+            own += x * x + y * y
             n += sums[0, i] * x * x + sums[1, i] * y * y
             n += 2.0 * (sums[3, i] * x * y + sums[4, i] * x * z + sums[5, i] * y * z)
         more = max(n - 1.0, 0.0) if several else 0.0
         parts[i] += more * at(inverse_mass, i) * at(pair_mass, i)
+        supported[i] = 1.0 if solids - own > 0.5 else supported[i]
 
 
 @stage
 def pair_parts(model, workspace, k):
     """Writes into how many parts the mass of a pair is split.
 
-    That is the mean of n of its two bodies, with their inverse masses as weights. k: the last
-    half-pair of the pair; the others get a copy.
+    That is the mean of n of its two bodies, with their inverse masses as weights. Also writes
+    whether one of them touched another solid in the last step. k: the last half-pair of the pair;
+    the others get a copy.
     """
     half_pair, live = model.half_pair[k], workspace.half_pair[k]
     owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
     parts, normal, plane = live.parts, live.normal, half_pair.kind == PLANE
+    supported = live.supported
     one, two, pair_mass = (
         half_pair.owner_inverse_mass,
         half_pair.surface_inverse_mass,
@@ -148,15 +154,17 @@ def pair_parts(model, workspace, k):
     )
     for i in range(LANES):
         parts[i] = 1.0
+        supported[i] = 0.0
     if owner.partners > 1:
-        add_parts(owner, one, pair_mass, normal, plane, parts)
+        add_parts(owner, one, pair_mass, normal, plane, parts, supported)
     if surface.partners > 1:
-        add_parts(surface, two, pair_mass, normal, plane, parts)
+        add_parts(surface, two, pair_mass, normal, plane, parts, supported)
     other = half_pair.next_in_pair
     while other != k:
-        same = workspace.half_pair[other].parts
+        same, too = workspace.half_pair[other].parts, workspace.half_pair[other].supported
         for i in range(LANES):
             same[i] = parts[i]
+            too[i] = supported[i]
         other = model.half_pair[other].next_in_pair
 
 

@@ -225,10 +225,11 @@ def make_collide(features):
         rotate_inertia(model, workspace)
         for i in range(LANES):
             workspace.lane[0].colliding[i] = 0
+            workspace.lane[0].drifted[i] = -1
         for k in range(model.half_pair.shape[0]):
             if workspace.half_pair[k].slots > 0:
                 contact_rows(model, state, workspace, g, k, workspace.lane[0].updates_memory, h)
-        impacts(model, workspace, h, False)
+        impacts(model, workspace, h, False, 0.0)
         couple_fingers(model, workspace, h)
         record_impacts(model, state, workspace, g, h, elapsed)
         expect_impacts(model, workspace, True)

@@ -12,7 +12,7 @@ where it changes, they are computed again.
 
 from physics.compiler.jit import LANES, at, sequence, stage
 from physics.model.features import cached_by_features
-from physics.model.state import NEW_FORCES
+from physics.model.state import BEGINS, NEW_FORCES
 from physics.model.workspace import BEGINNING
 from physics.step.lane_paths import copy_pose, make_relative_speed, rest_since_search
 
@@ -142,7 +142,9 @@ def make_short_substep(features, make_substep):
                 done += 0 if refreshes else 1
                 time = elapsed if turn < 0 or refresh else elapsed - h + done * span
                 starts = starts_collision_step and done <= 1
-                step(model, state, workspace, g, span, time, starts, refresh or refreshes)
+                step(
+                    model, state, workspace, g, span, time, starts, BEGINS if refreshes else refresh
+                )
                 if refresh:  # evaluates the forces of one step
                     break
             if turn >= 0 and not (refresh and lane.needs_refresh[turn] == 0):

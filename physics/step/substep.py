@@ -9,6 +9,7 @@ from physics.impulse.solver import make_impulses
 from physics.integrators.kick import make_kick
 from physics.model.features import EULER, Features, cached_by_features
 from physics.model.lanes import end_refresh
+from physics.model.state import QUERY
 from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.fields import make_fields, make_present_velocities, make_wrenches
 from physics.motion.gravity import gravity
@@ -72,13 +73,13 @@ def make_substep(features: Features):
     euler = features.integrator == EULER
     # of a kick before the drift; the rest comes after the new forces
     before = 1.0 if euler else 0.5
-    # A spring's force follows from the positions. Impulses belong to a time: in a refresh, to that
-    # of the kick that comes first
-    refresh_span = before if features.impulse else 0.0
+    # Impulses belong to a time: in a refresh, to that of the kick that comes first. So do the
+    # springs of contacts that begin, but the dashpot; a query has the forces at the positions
+    impulse, dashpot = features.impulse, features.dashpot
 
     @sequence
     def substep(model, state, workspace, g, h, elapsed, starts_collision_step, refresh):
-        """`refresh`: only computes the forces of states that were set from outside."""
+        """`refresh`: see `time_layers`; only computes the forces of states set from outside."""
         if not refresh:
             add_first_work(model, workspace, before * h)
             kick(model, workspace, before * h)
@@ -87,7 +88,9 @@ def make_substep(features: Features):
         compound_frames(model, workspace)
         broadphase(model, state, workspace, g, starts_collision_step)
         # a single call: two calls would be compiled twice
-        span, drifted = (refresh_span * h, 0.0) if refresh else (h, h)
+        span, drifted = (before * h, 0.0) if refresh else (h, h)
+        if refresh and not impulse and (dashpot or refresh == QUERY):
+            span = 0.0
         forces(model, state, workspace, g, h, span, drifted, elapsed)
         if refresh:
             end_refresh(model, state, workspace)

@@ -12,6 +12,7 @@ from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, factory, large_entry, stage
 from physics.model.features import RK4, Features, cached_by_features
 from physics.model.lanes import load, make_constants, store
+from physics.model.state import BEGINS, QUERY
 from physics.motion.kinematics import write_drive_frames, write_static_frames
 from physics.motion.servo_work import make_load_servos, make_store_servos
 from physics.step.readout import make_write_rows
@@ -105,7 +106,7 @@ def make_advance(features: Features):
                     state.world[lane.world[i]].overflow = 0
             # States that were set from outside have no forces yet, so their first step begins with
             # a refresh. It shares the call of `substep`, which would otherwise be compiled twice
-            refresh = needs_refresh > 0
+            refresh = (BEGINS if substeps > 0 else QUERY) if needs_refresh > 0 else 0
             if refresh:
                 forget(model, state, workspace, g)
             done = 0
@@ -115,7 +116,7 @@ def make_advance(features: Features):
                 for _s in range(left + (1 if refresh else 0)):
                     done += 0 if refresh else 1
                     substep(model, state, workspace, g, h, done * h, starts_collision_step, refresh)
-                    starts_collision_step, refresh = False, False
+                    starts_collision_step, refresh = False, 0
                 write_back(model, state, workspace, table, g, done * h, done == substeps)
                 if done == substeps:
                     break

@@ -257,12 +257,15 @@ def test_a_slow_scene_is_bitwise_that_of_fixed_steps_where_only_fast_bodies_are_
 
 
 def test_a_rod_at_rest_stays_at_rest_where_every_approach_is_advanced():
-    """It sinks deeper than its edges are round, so the points that touch change and it sways."""
+    """It sinks deeper than its edges are round, so the points that touch change and it sways.
+
+    Points that close their gap by swaying collide, at times that depend on the control.
+    """
     made, fixed = lying(4, "advancement"), lying(4, "fixed")
     made.advance(0.5)
     fixed.advance(0.5)
     assert np.abs(made.linear_velocity[:, 2]).max() < 1e-4
-    np.testing.assert_allclose(made.position[:, 2], fixed.position[:, 2], atol=1e-9)
+    np.testing.assert_allclose(made.position[:, 2], fixed.position[:, 2], atol=1e-6)
 
 
 @pytest.mark.parametrize("time_control", ["bisection", "adaptive", "advancement"])

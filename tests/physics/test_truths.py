@@ -1,0 +1,92 @@
+"""What theory says where closed forms of single bodies on a plane say nothing.
+
+The right values stand in `physics.reference.truths`; a test has the fidelities that were wrong, and
+one of the other law. `python -m benchmarks.truths` shows all of them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from physics import PRESETS, Box, Sphere
+from physics.reference import truths
+
+NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
+BALL, CUBE = Sphere(truths.RADIUS), Box((truths.RADIUS,) * 3)
+
+
+@pytest.mark.parametrize(
+    "level", ["balanced", "solid", NEWTON], ids=["balanced", "solid", "newton"]
+)
+def test_a_ring_presses_on_a_ball_with_its_weight_and_its_inertia(level):
+    assert truths.swinging_force(level) == pytest.approx(3.0, rel=2e-3)
+    assert truths.circling_forces(level) == pytest.approx((1.0, 1.0, 1.0), rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    "level", ["balanced", "solid", NEWTON], ids=["balanced", "solid", "newton"]
+)
+def test_a_cube_slides_down_a_dome_with_the_force_of_theory(level):
+    assert truths.dome_slide(level) == pytest.approx((1.0, 1.0), rel=5e-3)
+
+
+@pytest.mark.parametrize(("level", "error"), [("balanced", 0.05), ("solid", 0.02), (NEWTON, 0.02)])
+def test_a_ball_leaves_a_dome_where_theory_says(level, error):
+    assert truths.leaving_cosine(level) == pytest.approx(1.0, abs=error)
+
+
+@pytest.mark.parametrize("others", [0, 33])
+@pytest.mark.parametrize(
+    "level", ["balanced", "solid", NEWTON], ids=["balanced", "solid", "newton"]
+)
+def test_impacts_without_friction_keep_their_energy(level, others):
+    if others and level is NEWTON:
+        pytest.skip("Newton's method has at most 32 bodies")
+    assert truths.cradle_energy(level, others=others) == pytest.approx(1.0, abs=5e-3)
+    if level != "balanced":  # all five separate together: relative speeds become -e times as fast
+        energy = (1.0 + 4.0 * 0.5**2) / 5.0
+        assert truths.cradle_energy(level, 0.5, others) == pytest.approx(energy, abs=1e-5)
+
+
+@pytest.mark.parametrize("others", [0, 33])
+@pytest.mark.parametrize("level", ["fast", "solid", NEWTON], ids=["fast", "solid", "newton"])
+@pytest.mark.parametrize(("restitution", "speed"), [(1.0, 0.05), (0.1, 0.1), (0.5, 0.02)])
+def test_impacts_without_a_load_have_their_restitution_however_slow(
+    level, restitution, speed, others, stress
+):
+    if others and level is NEWTON:
+        pytest.skip("Newton's method has at most 32 bodies")
+    if others and level == "fast" and not stress:
+        pytest.skip("a kernel of its own for ten seconds; see make stress")
+    measured = truths.falling_restitution(level, restitution, speed, others=others)
+    assert measured == pytest.approx(restitution, abs=1.5e-3)
+    if not others:
+        measured = truths.falling_restitution(level, restitution, speed, wall=True)
+        assert measured == pytest.approx(restitution, abs=1.5e-3)
+
+
+@pytest.mark.parametrize("level", ["fast", "accurate", "solid"])
+@pytest.mark.parametrize(("friction", "spin"), [(0.3, 0.0), (0.1, 30.0)])
+def test_a_ball_that_slides_through_a_plastic_impact_feels_all_of_its_friction(
+    level, friction, spin
+):
+    ratios = truths.plastic_friction(level, friction, spin)
+    assert ratios == pytest.approx(np.ones(len(ratios)), abs=1e-3)
+
+
+@pytest.mark.parametrize("shape", [BALL, CUBE], ids=["ball", "cube"])
+@pytest.mark.parametrize(("level", "error"), [("fast", 3e-3), ("accurate", 1e-4), ("solid", 1e-5)])
+def test_an_impact_in_the_first_step_has_its_restitution(shape, level, error):
+    for restitution in (0.5, 1.0):
+        ratios = truths.early_restitution(level, shape, restitution)
+        assert ratios == pytest.approx(np.ones(len(ratios)), abs=error)
+
+
+@pytest.mark.parametrize(
+    ("level", "error"), [(replace(PRESETS["solid"], substep=5e-4), 0.01), (NEWTON, 0.03)]
+)
+def test_a_rocking_block_keeps_its_angular_momentum_about_the_edge_that_it_hits(level, error):
+    """First order in the step: at 2 ms the impact comes up to half a step early or late."""
+    ratios = truths.rocking(level)
+    assert ratios.mean() == pytest.approx(truths.ROCKING, rel=error)
