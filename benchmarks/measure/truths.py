@@ -7,7 +7,7 @@ unit is given.
 from collections.abc import Iterator
 from dataclasses import replace
 
-from benchmarks.report.tables import Table
+from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity
 from physics.reference.truths import ROWS
 
@@ -17,7 +17,7 @@ NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 def measure() -> Iterator[Table]:
     """One table: right values, and those of each preset and of Newton's method."""
     levels: dict[str, Fidelity] = {**PRESETS, "newton": NEWTON}
-    rows = [
+    rows: list[list[Cell]] = [
         [name, f"{right:.4g}", *(f"{value(level):.4f}" for level in levels.values())]
         for name, right, value in ROWS
     ]
