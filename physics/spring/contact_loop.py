@@ -35,7 +35,7 @@ REPORT = np.dtype(
 
 
 def weighs_on_solids(features):
-    """Whether a static's surface may bear weight in any direction; bodies and drives bear none."""
+    """Whether the lower bound of the impact speed depends on the normal, as on inclined statics."""
     return not features.dashpot and (features.slope or not features.friction)
 
 

@@ -109,7 +109,8 @@ def hunt_crossley_force(
 
     Returns:
         Force in N, impact speed to remember in m/s, and persistence: 1 for a contact that lasts,
-        inversely proportional to the impact speed for a faster one.
+        inversely proportional to the impact speed for a faster one, or to its approach times
+        max(a / 2, 1) if that is more.
     """
     b = 0.5 * h * abs(approach) + 1e-30
     reach = penetration + b
