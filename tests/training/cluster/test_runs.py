@@ -54,8 +54,8 @@ def command(*words):
         process.communicate()
 
 
-def train_words(address, folder, *more):
-    words = ["train", "--env", REACH, "-n", STEPS, "--save-freq", 16_000, "-f", folder]
+def train_words(address, folder, *more, steps=STEPS):
+    words = ["train", "--env", REACH, "-n", steps, "--save-freq", 16_000, "-f", folder]
     return [*words, "--hyperparams", *NO_EVALUATION, "--ray", address, *more]
 
 
@@ -110,7 +110,10 @@ def test_a_killed_node_costs_only_the_work_since_the_last_checkpoint(fragile, tm
 
 def test_ctrl_c_saves_a_checkpoint_of_each_run_and_resuming_works_there_too(address, tmp_path):
     first = folder_of(tmp_path, 1)
-    with command(*train_words(address, tmp_path, "--seeds", "0-3")) as process:
+    # long enough that neither of the two that start first finishes before Ctrl-C arrives, in
+    # whatever order their workers come up
+    words = train_words(address, tmp_path, "--seeds", "0-3", steps=10 * STEPS)
+    with command(*words) as process:
         wait_for(first.checkpoints, process)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)
@@ -119,7 +122,7 @@ def test_ctrl_c_saves_a_checkpoint_of_each_run_and_resuming_works_there_too(addr
     # two of the four runs had started
     assert {path.name[-1] for path in first.path.parent.iterdir()} <= {"1", "2"}
     steps = read_state(first.checkpoint)["steps"]
-    assert 0 < steps < STEPS
+    assert 0 < steps < 10 * STEPS
     shorter = first.config().replace(n_timesteps=steps + 6400)
     (first.path / "config.yaml").write_text(shorter.as_yaml())
     words = ["train", "--resume", first.path, "--ray", address]
