@@ -19,7 +19,9 @@ that angle.
 A contact is at rest if it closes by no more than the speed that its load gives it in a short time,
 `HALF_PAIR.rest_time`. The load is what pressed the contact in the last step, or what made it close
 faster; what the known forces would do, where the last step isn't known. Bodies that fall freely
-side by side have none, and an edge that a block rocks down onto has little.
+side by side have none, and an edge that a block rocks down onto has little. Of several contacts of
+a pair some bear nothing, and tremble: so a contact is also at rest if it closes by no more than the
+speed that all that pressed its pair gives the pair's mass in one step, which no step resolves.
 """
 
 import math
@@ -100,6 +102,30 @@ def resolved(owner, surface, point, i, h, bend):
 
 
 @cached_by_features
+def make_sum_loads(features):
+    """Stage that adds up what pressed the contacts of a pair in the last step, collisions aside."""
+    NORMAL = contact_memory(features).normal_force
+
+    @stage
+    def sum_loads(model, candidates, workspace, k, pressed):
+        """Writes newtons [LANES]. `candidates`: those of a lane group."""
+        for i in range(LANES):
+            pressed[i] = 0.0
+        other = k
+        while True:
+            first = model.half_pair[other].first_slot
+            for n in range(workspace.half_pair[other].slots):
+                memory = candidates[first + n].memory
+                for i in range(LANES):
+                    pressed[i] += memory[NORMAL, i]
+            other = model.half_pair[other].next_in_pair
+            if other == k:
+                break
+
+    return sum_loads
+
+
+@cached_by_features
 def make_prepare(features):
     """Stage that writes the rows of a half-pair whose points `find_points` has found.
 
@@ -112,11 +138,14 @@ def make_prepare(features):
     APPROACH = memory_rows.approach
 
     @stage
-    def prepare(slots, candidate, owner, surface, frame, A, B, constants, h, drifted, points):
+    def prepare(
+        slots, candidate, owner, surface, frame, A, B, constants, h, drifted, pressed, points
+    ):
         """Writes rows with the impulses of the last step as the first guess.
 
         `frame` describes the surface; remembered vectors are in the frame of its solid. `h` is the
-        time in s over which the impulses of a step act; `drifted` [LANES]: see LANE.
+        time in s over which the impulses of a step act; `drifted` [LANES]: see LANE; `pressed`
+        [LANES]: N, with which the pair was pressed in the last step.
         """
         F, E, rest_times, per_h = owner.force, surface.force, constants.rest_time, 1.0 / h
         rest_speeds = constants.rest_speed
@@ -210,6 +239,7 @@ def make_prepare(features):
             for i in range(LANES):
                 load = max(point.rest_speed[i], memory[NORMAL, i] / point.mass[i])
                 rest_speed = max(at(rest_times, i) * load, per_h * TOUCH_TOLERANCE)
+                rest_speed = max(rest_speed, h * pressed[i] / at(pair_mass, i))
                 # at an impact and after it the last step says nothing
                 point.rest_speed[i] = at(rest_speeds, i) if drifted[i] < 0 else rest_speed
 
@@ -225,7 +255,7 @@ def make_contact_rows(features):
         features, lambda kind: None if kind == PLANE else make_points_of_kind(features, kind)
     )
     has_plane, has_solids = PLANE in kinds, any(kind != PLANE for kind in kinds)
-    prepare = make_prepare(features)
+    prepare, sum_loads = make_prepare(features), make_sum_loads(features)
 
     @stage
     def contact_rows(model, state, workspace, g, k, updates_memory, h):
@@ -250,8 +280,11 @@ def make_contact_rows(features):
                 constants.kind, model, k, slots, candidate, relative, constants, updates_memory,
                 points,
             )  # fmt: skip
-        drifted = workspace.lane[0].drifted
-        prepare(slots, candidate, owner, surface, frame, A, B, constants, h, drifted, points)
+        drifted, pressed = workspace.lane[0].drifted, workspace.relative[0].normal_force_sum
+        sum_loads(model, state.candidate[g], workspace, k, pressed)
+        prepare(
+            slots, candidate, owner, surface, frame, A, B, constants, h, drifted, pressed, points
+        )
 
     return contact_rows
 

@@ -34,7 +34,7 @@ from physics.impulse.sweep import anchor_kept, arrives
 from physics.model.features import cached_by_features
 
 # per substep, at most
-ITERATIONS = 16
+ITERATIONS = 32
 
 
 @stage

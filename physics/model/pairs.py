@@ -185,6 +185,7 @@ def _half_pairs(
 ) -> Iterator[HalfPair]:
     """All half-pairs through which the scene's solids can touch, in a fixed order."""
     dynamic_count = len(scene.bodies) + len(scene.driven_bodies)
+    of_meshes: dict[tuple[Mesh, float], tuple[Samples, float]] = {}
 
     def rounding(solid: Body | Drive | Static) -> float:
         return fidelity.rounding * solid.shape.width / 2.0
@@ -220,11 +221,13 @@ def _half_pairs(
         solid: Body | Drive | Static, other: Solid, least: float = 0.0
     ) -> Iterator[tuple[Samples, bool, float]]:
         """The same with their `crowding`; where springs could be unstable weights are lowered."""
+        shape = solid.shape
         for samples, flat in sample_sets(solid, other, least):
-            if isinstance(solid.shape, Mesh) and fidelity.law == "spring":
-                shape = solid.shape
-                depth, most = impact_depth(shape, fidelity), stiffest(shape, fidelity)
-                samples, crowding = pressed(shape, samples, depth, most)
+            if isinstance(shape, Mesh) and fidelity.law == "spring":
+                if (shape, least) not in of_meshes:  # a mesh has one set of samples
+                    depth, most = impact_depth(shape, fidelity), stiffest(shape, fidelity)
+                    of_meshes[shape, least] = pressed(shape, samples, depth, most)
+                samples, crowding = of_meshes[shape, least]
                 yield samples, flat, crowding
             else:
                 yield samples, flat, 1.0

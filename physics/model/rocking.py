@@ -29,19 +29,28 @@ def largest_eigenvalue(inverse_mass: Array, A: Array) -> Array:
     return np.asarray(np.linalg.eigvals(inverse_mass @ A).real.max(axis=-1, initial=0.0))
 
 
+def outward_sides(shape: Shape) -> Array:
+    """Outward normals [k, 3] of the sides on which a solid can lie.
+
+    Particles have sides of their own, all other shapes the six normal to their axes, and a mesh its
+    flat sides besides.
+    """
+    if isinstance(shape, Particles):
+        return shape.sides
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    return np.concatenate([axes, shape.sides()]) if isinstance(shape, Mesh) else axes
+
+
 def face_contacts(shape: Shape, spacing: float) -> list[tuple[Array, Array]]:
     """Unit stiffness along and across the normal, [6, 6] each, for each side it can lie on.
 
-    The samples that touch share the stiffness by their weights. Particles have sides of their own,
-    all other shapes the six normal to their axes, and a mesh its flat sides besides.
+    The samples that touch share the stiffness by their weights.
     """
     samples = shape.samples(spacing, 0.0)
     weights, radius = samples.weights, samples.radius
     radii = np.broadcast_to(radius, len(weights))
     found = []
-    own = -shape.sides if isinstance(shape, Particles) else (*np.eye(3), *-np.eye(3))
-    others = shape.sides() if isinstance(shape, Mesh) else ()
-    for normal in (*own, *others):
+    for normal in -outward_sides(shape):
         positions = facing(samples, normal)
         height = positions @ normal - radii
         lowest = height <= height.min() + 1e-9

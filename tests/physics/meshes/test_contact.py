@@ -117,6 +117,19 @@ def settled(request):
     return world, np.array(heights)
 
 
+def test_nothing_collides_while_all_is_at_rest(settled):
+    """Of the bowl's samples some bear nothing, and tremble while a ball rolls in it."""
+    world, _ = settled
+    if world.fidelity.law == "spring":
+        return
+    simulation = world._simulation
+    for _ in range(20):
+        world.advance(world.fidelity.substep)
+        workspace = simulation.take_workspace()
+        assert not workspace.lane["colliding"].any()
+        simulation.return_workspace(workspace)
+
+
 def test_towers_of_meshed_cubes_stand_as_those_of_boxes_do(settled):
     """Also those of both kinds: boxes on meshes, and meshes on boxes."""
     world, _ = settled

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from physics import Box, Mesh
 from physics.meshes.properties import properties
+from physics.model.rocking import face_contacts
 from physics.reference import meshes
 from physics.rotation import rotation_matrix
 
@@ -103,3 +105,14 @@ def test_a_scaled_mesh_is_the_mesh_in_other_units():
     small, same = mesh.samples(0.01, 1e-3), large.samples(0.03, 3e-3)
     np.testing.assert_allclose(same.positions, 3.0 * small.positions)
     np.testing.assert_array_equal(same.weights, small.weights)
+
+
+def test_the_contacts_of_a_flat_side_are_those_of_that_side():
+    """On a slanted side a pyramid has many samples; opposite is its apex or a corner."""
+    cone = trimesh.creation.cone(0.05, 0.1, sections=3)
+    pyramid = Mesh(vertices=cone.vertices, faces=cone.faces)
+    slanted = [n for n in pyramid.sides() if np.abs(n).max() < 0.999]
+    along = face_contacts(pyramid, 0.02)[6:]
+    assert len(along) >= len(slanted) > 0
+    for matrix, _ in along:  # several points resist up and down as well as two rotations
+        assert np.linalg.matrix_rank(matrix) == 3
