@@ -1,24 +1,77 @@
-"""Truths of theory by preset: forces on curved surfaces, impacts, rocking.
+"""Truths of theory by preset: forces on curved surfaces, impacts, rocking, loads that tip and pull.
 
-`physics.reference.truths` states each scene and derives its right value. Values are ratios unless a
-unit is given.
+`physics.reference.truths` and `loads` state each scene and derive its right value. Values are
+ratios unless a unit is given.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity
+from physics.reference import loads
 from physics.reference.truths import ROWS
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 
 
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.1f}"
+
+
+def _tipping(slow: bool, size: float) -> Callable[[Fidelity], str]:
+    def cell(level: Fidelity) -> str:
+        predicted = loads.predicted_tipping(level, size)
+        bound = _degrees(predicted.gradual) if slow else f"≥ {_degrees(predicted.sudden)}"
+        return f"{_degrees(loads.tipping_slope(level, slow, size))} ({bound})"
+
+    return cell
+
+
+def _pull(part: float, slow: bool) -> Callable[[Fidelity], str]:
+    def cell(level: Fidelity) -> str:
+        moved, speed = loads.pulled(level, part, slow)
+        predicted = loads.predicted_pull(level, part)
+        if part > 1.0:
+            most = 2.0 * (part - 1.0) * loads.FRICTION * loads.GRAVITY + predicted.speed
+            return f"{speed:.4f} (≤ {most:.4f})"
+        bound = f"{1e3 * predicted.gradual:.2g}" if slow else f"≤ {1e3 * predicted.sudden:.2g}"
+        return f"{1e3 * moved:.2g} ({bound})"
+
+    return cell
+
+
+def _leaning(slow: bool) -> Callable[[Fidelity], str]:
+    return lambda level: "; ".join(_degrees(angle) for angle in loads.leaning(level, slow))
+
+
+def _loads() -> tuple[tuple[str, str, Callable[[Fidelity], str]], ...]:
+    """Name of a load, right value, and the measured one at a fidelity, with the predicted one."""
+    right = _degrees(math.atan2(*loads.BOX))
+    stick = _degrees(loads.leaning_angle())
+    speed = f"{0.02 * loads.FRICTION * loads.GRAVITY:.4f}"
+    return (
+        ("box, slow pull that tips it, °", right, _tipping(True, 1.0)),
+        ("box set down, slope that tips it, °", right, _tipping(False, 1.0)),
+        ("one ten times as large, set down, °", right, _tipping(False, 10.0)),
+        ("cube, slow pull of 0.5 μ m g moves it, mm", "0", _pull(0.5, True)),
+        ("cube, sudden pull of 0.9 μ m g moves it, mm", "0", _pull(0.9, False)),
+        ("cube, pull of 1.01 μ m g, speed after 2 s, m/s", speed, _pull(1.01, False)),
+        ("stick let go, least angle; where it stands then, °", stick, _leaning(False)),
+        ("the same, its weight grows", stick, _leaning(True)),
+    )
+
+
 def measure() -> Iterator[Table]:
-    """One table: right values, and those of each preset and of Newton's method."""
+    """Right values, and those of each preset and of Newton's method; then what loads do."""
     levels: dict[str, Fidelity] = {**PRESETS, "newton": NEWTON}
     rows: list[list[Cell]] = [
         [name, f"{right:.4g}", *(f"{value(level):.4f}" for level in levels.values())]
         for name, right, value in ROWS
     ]
     yield Table("truths", "Truths of theory", ["truth", "right", *levels], rows)
+    rows = [
+        [name, right, *(cell(level) for level in levels.values())] for name, right, cell in _loads()
+    ]
+    yield Table("loads", "Loads on bodies that stand", ["load", "rigid", *levels], rows)

@@ -22,6 +22,7 @@ from physics.tuning.candidates import can_touch, safe_speed
 from physics.tuning.description import code
 from physics.tuning.motion import side_by_side
 from physics.tuning.parts_cost import parts_cost
+from physics.tuning.standing_text import standing
 from physics.world import World
 
 Array = np.ndarray
@@ -44,7 +45,7 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     """What a fidelity means for a scene, as text.
 
     It says what is modelled and what is left out, the largest stable step, the stiffness of
-    contacts, how deep bodies sink at rest, and what each part costs.
+    contacts, how deep bodies sink at rest, how early they tip, and what each part costs.
 
     Args:
         scene: the scene.
@@ -66,6 +67,9 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     if len(model.half_pair):
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
+        kinds = [_kind(solid) for solid in (*few.bodies, *few.driven_bodies, *few.statics)]
+        stands = [f"  {line}" for line in standing(few, fidelity, model, kinds)]
+        lines += ["", "Standing", *stands] if stands else []
     if costs and not refused:
         worlds = side_by_side(scene)
         which = "world" if worlds == 1 else "of many worlds"
