@@ -20,6 +20,8 @@ from physics.spring.mass_splitting import splits_mass
 
 # m/s, least lower bound of the impact speed
 LEAST_SPEED = 1e-9
+# m/s, below any other: the impact speed that contacts of a state that was set remember
+SLOWEST = 1e-200
 
 # one row per slot: what `World.contacts` reports of the candidates there
 REPORT = np.dtype(
@@ -60,7 +62,8 @@ def make_contact_loop(features, kind, report):
     SHEAR, TWIST, FACE = memory_rows.shear, memory_rows.twist, memory_rows.face
 
     @stage
-    def contact_loop(slots, candidate, relative, constants, h, ahead, rows):
+    def contact_loop(slots, candidate, relative, constants, h, any_face, rows):
+        """`any_face`: a sample whose face is another than that it remembers is no new contact."""
         R, c = relative.rotation, relative.position
         v, omega = relative.velocity, relative.angular_velocity
         force, torque, normal_force_sum = relative.force, relative.torque, relative.normal_force_sum
@@ -76,6 +79,7 @@ def make_contact_loop(features, kind, report):
         current_weight, normal_sum = relative.current_weight, relative.normal_sum
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals, axial = constants.face_normals != 0, constants.axial != 0
+        any_face |= not face_normals
         overlap_share = constants.overlap_share
         gravity, fall, steep = constants.gravity, relative.gravity, constants.slide_slope
         rolling, spinning = constants.rolling, constants.spinning
@@ -123,18 +127,15 @@ def make_contact_loop(features, kind, report):
                 approach = -uz if plane else -(ux * nx + uy * ny + uz * nz)
                 impact_speed = memory[SPEED, i]
                 if has_faces:  # a sample that changed the face is a new contact
-                    same = (face == memory[FACE, i]) | (not face_normals)
+                    same = (face == memory[FACE, i]) | any_face
                     impact_speed = impact_speed if same else 0.0
-                begins = impact_speed == 0.0
-                # a contact without memory at the start: the mean over the coming half step
-                reached = penetration + ahead * approach if begins else penetration
+                begins = abs(impact_speed) <= SLOWEST
                 normal, impact_speed, persistence = normal_force(
-                    reached,
+                    penetration,
                     approach,
                     k,
                     a,
                     floor,
-                    ahead > 0.0,
                     inverse_mass,
                     speed_per_load,
                     h,

@@ -28,10 +28,12 @@ from physics.model.lanes import (
 from physics.model.state import BEGINS, QUERY
 from physics.motion.vectors import rotated
 from physics.scene.shapes import BOX, GRID, PLANE
-from physics.spring.contact_loop import LEAST_SPEED, make_contact_loop, weighs_on_solids
+from physics.spring.contact_loop import LEAST_SPEED, SLOWEST, make_contact_loop, weighs_on_solids
 from physics.spring.energy_correction import make_energy_correction
 from physics.spring.mass_splitting import split_masses, splits_mass
 
+# N, a load above any force
+_ANY_LOAD = 1e200
 # N; below this normal force of a pair, weight / force could overflow
 _LEAST_FORCE = 1e-200
 
@@ -106,7 +108,7 @@ def make_loop(features, kind, report):
     box, grid, compound = kind == BOX, kind == GRID, features.compound
     correct_energy = make_energy_correction(features)
     contact_loop = make_contact_loop(features, kind, report)
-    save_memory, restore_memory = make_keep_memory(features)
+    save_memory, begin_memory, restore_memory = make_keep_memory(features)
     halfway = features.integrator != EULER
 
     @sequence
@@ -115,6 +117,16 @@ def make_loop(features, kind, report):
         first = constants.first_slot
         candidate = state.candidate[g, first : first + slots]
         out = rows[first : first + slots] if report else rows
+        # nearly always all candidates remember this step, so the loop doesn't ask
+        lane, saved = workspace.lane[0], workspace.saved_memory
+        keeps = refresh or lane.waiting != 0
+        if keeps:
+            save_memory(candidate, slots, saved)
+        begins = halfway and refresh == BEGINS
+        if begins:
+            begin_memory(candidate, slots, lane.updates_memory)
+            keep_pose(relative, workspace.relative[1])
+            move_ahead(relative, 0.5 * h, lane.updates_memory)
         if compound and box:
             mark_hidden_faces(model, k, candidate, relative)
         if grid:
@@ -124,13 +136,9 @@ def make_loop(features, kind, report):
         # face that each candidate remembers. Not in a refresh, before which nothing has moved
         if box and constants.face_normals == 0 and not refresh:
             correct_energy(slots, candidate, relative, constants, h)
-        # nearly always all candidates remember this step, so the loop doesn't ask
-        lane, saved = workspace.lane[0], workspace.saved_memory
-        keeps = refresh or lane.waiting != 0
-        if keeps:
-            save_memory(candidate, slots, saved)
-        ahead = 0.5 * h if halfway and refresh == BEGINS else 0.0
-        contact_loop(slots, candidate, relative, constants, h, ahead, out)
+        contact_loop(slots, candidate, relative, constants, h, begins, out)
+        if begins:
+            keep_pose(workspace.relative[1], relative)
         if keeps:
             restore_memory(candidate, slots, saved, lane.updates_memory, refresh)
 
@@ -139,7 +147,7 @@ def make_loop(features, kind, report):
 
 @cached_by_features
 def make_keep_memory(features):
-    """Stages that save the memory of candidates and restore it where a step doesn't count."""
+    """Stages that save the memory of candidates, begin it and restore it."""
     memory_rows = contact_memory(features)
     size, FORCE, SPEED = memory_rows.size, memory_rows.normal_force, memory_rows.impact_speed
 
@@ -149,6 +157,20 @@ def make_keep_memory(features):
             for row in range(size):
                 for i in range(LANES):
                     saved[n].memory[row, i] = candidate[n].memory[row, i]
+
+    @stage
+    def begin_memory(candidate, slots, updates_memory):
+        """Makes contacts of a state that was set last ones that bear any load.
+
+        So a sample that the state puts inside a surface is no impact: at rest it has the undamped
+        force of its spring.
+        """
+        for n in range(slots):
+            memory = candidate[n].memory
+            for i in range(LANES):
+                begins = updates_memory[i] != 0
+                memory[FORCE, i] = _ANY_LOAD if begins else memory[FORCE, i]
+                memory[SPEED, i] = SLOWEST if begins else memory[SPEED, i]
 
     @stage
     def restore_memory(candidate, slots, saved, updates_memory, refresh):
@@ -167,7 +189,35 @@ def make_keep_memory(features):
                     candidate[n].memory[FORCE, i] = 0.0
                     candidate[n].memory[SPEED, i] = 0.0
 
-    return save_memory, restore_memory
+    return save_memory, begin_memory, restore_memory
+
+
+@stage
+def keep_pose(relative, kept):
+    """Copies the pose of a row of SOLID."""
+    for row in range(9):
+        for i in range(LANES):
+            kept.rotation[row, i] = relative.rotation[row, i]
+    for row in range(3):
+        for i in range(LANES):
+            kept.position[row, i] = relative.position[row, i]
+
+
+@stage
+def move_ahead(relative, time, moves):
+    """Moves an owner to where its velocities take it in `time` s, to first order."""
+    R, c, v, w = relative.rotation, relative.position, relative.velocity, relative.angular_velocity
+    for i in range(LANES):
+        part = time if moves[i] != 0 else 0.0
+        c[0, i] += part * v[0, i]
+        c[1, i] += part * v[1, i]
+        c[2, i] += part * v[2, i]
+        wx, wy, wz = part * w[0, i], part * w[1, i], part * w[2, i]
+        for column in range(3):
+            x, y, z = R[column, i], R[3 + column, i], R[6 + column, i]
+            R[column, i] = x + (wy * z - wz * y)
+            R[3 + column, i] = y + (wz * x - wx * z)
+            R[6 + column, i] = z + (wx * y - wy * x)
 
 
 @cached_by_features

@@ -71,7 +71,6 @@ def hunt_crossley_force(
     k,
     a,
     floor,
-    fresh,
     inverse_mass,
     speed_per_load,
     h,
@@ -92,8 +91,6 @@ def hunt_crossley_force(
         k: N/m.
         a: damping coefficient.
         floor: m/s, lower bound of the impact speed.
-        fresh: whether the state was set from outside. A contact that it puts inside the surface is
-            no impact: it has the undamped force of its spring.
         inverse_mass: 1/kg, inverse of the pair mass; for an owner with a single sample, inverse
             of the effective mass at its contact point, to which rotation contributes.
         speed_per_load: m/s per N, 1/(m omega) of the mass of `inverse_mass`.
@@ -137,7 +134,7 @@ def hunt_crossley_force(
     # numerators over r: a d / v = y / r, and the x of the docstring is x / r
     r = v * D
     y = a * S
-    x = 0.0 if fresh & begins & (not enters) else h * k * inverse_mass * y
+    x = h * k * inverse_mass * y
     numerator = k * (v * S + y * approach) * (r + 0.5 * x) + 0.5 * x * (r + x) * load
     divisor = r * r + r * x + 0.5 * x * x
     # near e = 0 any impact is slow compared with `floor`, but not with the speed that a load gives
@@ -162,7 +159,6 @@ def dashpot_force(
     k,
     zeta,
     floor,
-    fresh,
     inverse_mass,
     speed_per_load,
     h,
