@@ -49,13 +49,13 @@ def make_clear(features):
 def make_add_candidate(features):
     """Stage that writes a candidate into a slot, with the memory that its sample had before."""
     memory_size, impulse = contact_memory(features).size, features.impulse
-    hidden, remembered_face = features.box and features.compound, contact_memory(features).face
+    hidden = features.box and features.compound
 
     @stage
-    def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight, face):
-        """`old`: the list before, `count` long; ids below `cursor` are done. Returns the cursor.
+    def add_candidate(row, i, old, cursor, count, sample_id, x, y, z, weight):
+        """`old`: the list before, `count` long; ids below `cursor` are done.
 
-        A sample that was not in it came in through `face`, see `entry_face`.
+        Returns the cursor, and whether the sample was in it.
         """
         while cursor < count and old[cursor].sample_id < sample_id:
             cursor += 1
@@ -69,12 +69,10 @@ def make_add_candidate(features):
                 row.hidden_offset[axis, i] = 0.0
         for m in range(memory_size):
             row.memory[m, i] = old[cursor].memory[m] if known else 0.0
-        if remembered_face >= 0 and not known:
-            row.memory[remembered_face, i] = face
         if impulse:
             for axis in range(3):
                 row.impact_force[axis, i] = 0.0
-        return cursor
+        return cursor, known
 
     return add_candidate
 
@@ -91,7 +89,7 @@ def make_list_samples(features):
         features, lambda kind: None if kind == PARTICLES else core_distance(kind)
     )
     turn = by_surface_kind(features, lambda kind: facing(kind) if kind in FLOORS else None)
-    box, cylinder = features.box, features.cylinder
+    box, cylinder, remembered_face = features.box, features.cylinder, contact_memory(features).face
     entry_face = make_entry_face(features, turn)
 
     @stage
@@ -126,10 +124,9 @@ def make_list_samples(features):
         pairs = particles and half_pair.partner_count > 0
         if not pairs:
             separations(model, half_pair, i, relative, workspace.separation)
-        face, face_normals = 0.0, half_pair.face_normals != 0
+        face, face_normals = 0.0, half_pair.face_normals != 0  # 0: not known yet
         faces = (box and half_pair.kind == BOX) or (cylinder and half_pair.kind == CYLINDER)
-        if faces and face_normals:
-            face = entry_face(model, workspace, half_pair, i, relative)
+        faces = faces and face_normals
         for s in range(half_pair.sample_count):
             separation = 0.0 if pairs else workspace.separation[s]
             if not pairs and not separation < reach:
@@ -162,8 +159,8 @@ def make_list_samples(features):
                     elif separation < reach:
                         row, pair_id = candidate[n], s * half_pair.partner_count + j
                         smaller = min(weight, p[3])
-                        cursor = add_candidate(
-                            row, i, old, cursor, old_count, pair_id, sx, sy, sz, smaller, 0.0
+                        cursor, _ = add_candidate(
+                            row, i, old, cursor, old_count, pair_id, sx, sy, sz, smaller
                         )
                         row.partner[0, i] = px
                         row.partner[1, i] = py
@@ -174,10 +171,11 @@ def make_list_samples(features):
                         nearest = separation
             else:
                 row = candidate[n]
-                overlaps = separation < 0.0
-                cursor = add_candidate(
-                    row, i, old, cursor, old_count, s, sx, sy, sz, weight, face if overlaps else 0.0
-                )
+                cursor, known = add_candidate(row, i, old, cursor, old_count, s, sx, sy, sz, weight)
+                if faces and not known and separation < 0.0:
+                    if face == 0.0:
+                        face = entry_face(model, workspace, half_pair, i, relative)
+                    row.memory[remembered_face, i] = face
                 if impulse:
                     core = half_pair.core
                     ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
