@@ -140,8 +140,8 @@ def hunt_crossley_force(
     # near e = 0 any impact is slow compared with `floor`, but not with the speed that a load gives
     fastest = max(v, abs(approach) * max(a / _CALM, 1.0))
     # for both quotients: divisions are the expensive part
-    inverse = 1.0 / (divisor * v * fastest)
-    force = numerator * v * (fastest * inverse)
+    inverse = 1.0 / (divisor * fastest)
+    force = numerator * fastest * inverse
     # a sample that is apart, in reach only through b, and separates already, never touched
     touching = (reach > 0.0) & ((impact_speed != 0.0) | (approach > 0.0) | (penetration > 0.0))
     touching &= exists
@@ -149,7 +149,7 @@ def hunt_crossley_force(
     impact_speed = speed if approach > 0.0 else -speed
     impact_speed = impact_speed if touching else 0.0
     calm = max(floor, calm_per_load * load)
-    return force, impact_speed, min(1.0, calm * divisor * v * inverse)
+    return force, impact_speed, min(1.0, calm * divisor * inverse)
 
 
 @stage
