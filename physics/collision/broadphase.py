@@ -109,6 +109,29 @@ def spend_skin(solid, other, half_pair, live, least):
     return exhausted
 
 
+@stage
+def spare_spin(solid, half_pair, live, least):
+    """Gives skin back that a spin about the owner's z axis took: it moves no sample that turns.
+
+    As `spend_skin`, which it follows, it returns how many lanes have too little left.
+    """
+    R, w, rotation_bound = solid.rotation, solid.angular_velocity, solid.rotation_bound
+    relative_motion, remaining_skin = live.relative_motion, live.remaining_skin
+    skin, exhausted = half_pair.skin, 0
+    for i in range(LANES):
+        x, y, z = w[0, i], w[1, i], w[2, i]
+        whole = abs(x) + abs(y) + abs(z)
+        spin = x * R[2, i] + y * R[5, i] + z * R[8, i]
+        x, y, z = x - spin * R[2, i], y - spin * R[5, i], z - spin * R[8, i]
+        tilts = min((abs(x) + abs(y) + abs(z)) / max(whole, 1e-300), 1.0)
+        spared = rotation_bound[i] * (1.0 - tilts)
+        motion, left = relative_motion[i] - spared, remaining_skin[i] + spared
+        relative_motion[i] = motion
+        remaining_skin[i] = left
+        exhausted += 1 if left < max(motion, least * at(skin, i)) else 0
+    return exhausted
+
+
 @cached_by_features
 def make_broadphase(features):
     """Stage that reduces the remaining skin by the last drift and replaces lists that need it.
@@ -117,6 +140,7 @@ def make_broadphase(features):
     first collision step of a call of `advance` does not.
     """
     search_half_pair, impulse = make_search_half_pair(features), features.impulse
+    axial = features.axial
 
     @stage
     def broadphase(model, state, workspace, g, starts_collision_step):
@@ -125,6 +149,8 @@ def make_broadphase(features):
             least = renewal(half_pair, impulse) if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
             exhausted = spend_skin(owner, surface, half_pair, live, least)
+            if axial and half_pair.axial != 0:
+                exhausted = spare_spin(owner, half_pair, live, least)
             if exhausted > 0:
                 search_half_pair(model, state, workspace, g, k, least)
 

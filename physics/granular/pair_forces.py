@@ -160,7 +160,7 @@ def make_law(features):
         """
         approach = -(ux * nx + uy * ny + uz * nz)
         normal = dashpot_force(
-            penetration, approach, k, damping, 0.0, False, inverse_mass, 0.0, h,
+            penetration, approach, k, damping, 0.0, inverse_mass, 0.0, h,
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, True,
         )[0]  # fmt: skip
         fx, fy, fz = normal * nx, normal * ny, normal * nz

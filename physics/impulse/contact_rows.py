@@ -16,6 +16,11 @@ first step of a contact, where a sample changes the face, and where a step turns
 direction in which the contact moves, by more than a radian: |b| is at most half of the speed times
 that angle.
 
+The samples of a cylinder or torus on a floor don't turn with it about its axis, see
+`collision.facing`: that part of u n, `turned`, changes no separation. Where such a sample is apart,
+b takes it away. (The leading samples of a wheel that rolls at 40 m/s would else be stopped above
+the ground, and throw it into the air.)
+
 A contact is at rest if it closes by no more than the speed that its load gives it in a short time,
 `HALF_PAIR.rest_time`. The load is what pressed the contact in the last step, or what made it close
 faster; what the known forces would do, where the last step isn't known. Bodies that fall freely
@@ -35,7 +40,7 @@ from physics.compiler.jit import LANES, at, stage
 from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
-from physics.motion.vectors import rotated
+from physics.motion.vectors import cross, rotated
 from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
 
 
@@ -125,6 +130,16 @@ def make_sum_loads(features):
     return sum_loads
 
 
+@stage
+def turning_rate(owner, point, i):
+    """m/s, the part of u n at a point that is due to the owner's spin about its own z axis."""
+    R, w = owner.rotation, owner.angular_velocity
+    ax, ay, az = R[2, i], R[5, i], R[8, i]
+    x, y, z = cross(ax, ay, az, point.arm[0, i], point.arm[1, i], point.arm[2, i])
+    spin = w[0, i] * ax + w[1, i] * ay + w[2, i] * az
+    return spin * (x * point.normal[0, i] + y * point.normal[1, i] + z * point.normal[2, i])
+
+
 @cached_by_features
 def make_prepare(features):
     """Stage that writes the rows of a half-pair whose points `find_points` has found.
@@ -132,6 +147,7 @@ def make_prepare(features):
     That has left the separation of the last step, or inf, in `last_bend`.
     """
     friction, resistance, compound = features.friction, features.resistance, features.compound
+    axial = features.axial
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
     SHEAR, TWIST, BEND = memory_rows.shear, memory_rows.twist, memory_rows.bend
@@ -152,7 +168,7 @@ def make_prepare(features):
         inverse_mass, other = constants.owner_inverse_mass, constants.surface_inverse_mass
         G = frame.rotation if compound else surface.rotation
         Q, a, b = surface.rotation, owner.position, surface.position
-        pair_mass = constants.pair_mass
+        pair_mass, turns = constants.pair_mass, constants.axial != 0
         for n in range(slots):
             row, point = candidate[n], points[n]
             memory = row.memory
@@ -185,6 +201,10 @@ def make_prepare(features):
                 # only what touches may be pressed by it: a gap may never close
                 touches = (point.separation[i] <= 0.0) | (memory[NORMAL, i] > 0.0)
                 point.bend[i] = bend if touches else max(bend, 0.0)
+                if axial:
+                    turned = turning_rate(owner, point, i) if turns else 0.0
+                    point.turned[i] = turned
+                    point.bend[i] = point.bend[i] if touches | (not turns) else -turned
                 point.last_bend[i] = bend if moves else 0.0
                 ma, mb = at(inverse_mass, i), at(other, i)
                 along = F[0, i] * nx + F[1, i] * ny + F[2, i] * nz

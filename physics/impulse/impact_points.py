@@ -25,7 +25,7 @@ def make_find_impacts(features):
     in half a substep, a velocity that looks like an impact; so with joints only points collide that
     did so with the velocities of half a substep ago, too.
     """
-    timed, joints = features.finds_impacts, features.joints
+    timed, joints, axial = features.finds_impacts, features.joints, features.axial
 
     @stage
     def find_impacts(workspace, k, pair, constants, h, lags, part):
@@ -43,6 +43,8 @@ def make_find_impacts(features):
                 ux, uy, uz = relative_velocity(owner, surface, point, i)
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 un = ux * nx + uy * ny + uz * nz - bend
+                if axial:
+                    un -= point.turned[i]
                 un += part * point.normal_impulse[i] / point.mass[i]
                 if timed:
                     horizon, reach = workspace.timing[k].horizon[i], workspace.timing[k].reach[i]
@@ -70,35 +72,25 @@ def make_find_impacts(features):
 
 
 @stage
-def add_half_impulses(pair, colliding, part):
+def add_half_impulses(pair, colliding, part, attempt):
     """Adds what contacts give up to the present time: a part of their impulses of the last step.
 
-    Only in lanes with a collision, or the others would be rounded.
+    Only in lanes with a collision, or the others would be rounded. After the first `attempt` it
+    removes them again.
     """
-    points = pair.points
+    points, adds = pair.points, attempt == 0
     for n in range(points.shape[0]):
         point = points[n]
         normal, tangential, half = point.normal, point.tangential_impulse, point.half_impulse
         for i in range(LANES):
             size, given = point.normal_impulse[i], part if colliding[i] != 0 else 0.0
-            px = given * (size * normal[0, i] + tangential[0, i])
-            py = given * (size * normal[1, i] + tangential[1, i])
-            pz = given * (size * normal[2, i] + tangential[2, i])
+            px = given * (size * normal[0, i] + tangential[0, i]) if adds else -half[0, i]
+            py = given * (size * normal[1, i] + tangential[1, i]) if adds else -half[1, i]
+            pz = given * (size * normal[2, i] + tangential[2, i]) if adds else -half[2, i]
             half[0, i] = px
             half[1, i] = py
             half[2, i] = pz
             apply_impulse(pair, point, i, px, py, pz)
-
-
-@stage
-def remove_half_impulses(pair):
-    """Removes them."""
-    points = pair.points
-    for n in range(points.shape[0]):
-        point = points[n]
-        half = point.half_impulse
-        for i in range(LANES):
-            apply_impulse(pair, point, i, -half[0, i], -half[1, i], -half[2, i])
 
 
 @stage

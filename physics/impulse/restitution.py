@@ -39,7 +39,6 @@ from physics.impulse.impact_points import (
     add_half_impulses,
     make_find_impacts,
     make_impact_sweep,
-    remove_half_impulses,
     remove_push_out,
 )
 from physics.impulse.point_impulses import (
@@ -298,27 +297,32 @@ def make_impacts(features):
     @sequence
     def impacts(model, workspace, h, refresh, part):
         """`part`: see `make_find_impacts`."""
-        if find_all_impacts(model, workspace, h, False, part) == 0:
-            return
-        for k in range(model.half_pair.shape[0]):
-            if workspace.half_pair[k].slots > 0:
-                pair, colliding = operands_of(model, workspace, k), workspace.lane[0].colliding
-                add_half_impulses(pair, colliding, part)
-        for k in range(model.half_pair.shape[0]):
-            if workspace.half_pair[k].slots > 0:
-                remove_push_out(operands_of(model, workspace, k), workspace.lane[0].colliding)
-        couple_finger_velocities(model, workspace)
-        lane, collided = workspace.lane[0], 0
-        for i in range(LANES):
-            lane.unconverged[i] = lane.colliding[i]
-        find_all_impacts(model, workspace, h, False, 0.0)
-        for i in range(LANES):  # the other lanes lack their half impulses
-            lane.colliding[i] = lane.colliding[i] if lane.unconverged[i] != 0 else 0
-            collided += lane.colliding[i]
-        if collided > 0:
-            collide(model, workspace, h, refresh)
-        for k in range(model.half_pair.shape[0]):
-            if workspace.half_pair[k].slots > 0:
-                remove_half_impulses(operands_of(model, workspace, k))
+        lane, half_pairs = workspace.lane[0], model.half_pair.shape[0]
+        colliding, candidates = lane.colliding, lane.unconverged
+        # what collides, what still does without the push apart, and the end: each stage is called
+        # in one place, because two calls would be compiled twice
+        for attempt in range(3):
+            if attempt < 2:
+                left = part if attempt == 0 else 0.0
+                if find_all_impacts(model, workspace, h, False, left) == 0 and attempt == 0:
+                    return
+            if attempt == 1:
+                collided = 0
+                for i in range(LANES):  # the other lanes lack their half impulses
+                    colliding[i] = colliding[i] if candidates[i] != 0 else 0
+                    collided += colliding[i]
+                if collided > 0:
+                    collide(model, workspace, h, refresh)
+                continue
+            for k in range(half_pairs):
+                if workspace.half_pair[k].slots > 0:
+                    add_half_impulses(operands_of(model, workspace, k), colliding, part, attempt)
+            if attempt == 0:
+                for k in range(half_pairs):
+                    if workspace.half_pair[k].slots > 0:
+                        remove_push_out(operands_of(model, workspace, k), colliding)
+                couple_finger_velocities(model, workspace)
+                for i in range(LANES):
+                    candidates[i] = colliding[i]
 
     return impacts

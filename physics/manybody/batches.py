@@ -4,7 +4,12 @@ What a half-pair needs of its two solids is copied from `Crowd.frame` into two r
 memory, one lane per pair. Then the stages for worlds side by side do the rest.
 """
 
-from physics.collision.broadphase import make_search_half_pair, renewal, spend_skin
+from physics.collision.broadphase import (
+    make_search_half_pair,
+    renewal,
+    spare_spin,
+    spend_skin,
+)
 from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, sequence, stage
@@ -168,7 +173,7 @@ def make_find_candidates(features):
     """
     search_half_pair = make_search_half_pair(features)
     compound_frames = make_compound_frames(features)
-    compound, impulse = features.compound, features.impulse
+    compound, impulse, axial = features.compound, features.impulse, features.axial
 
     @sequence
     def find_candidates(model, state, workspace, crowd, pairs, b, starts_collision_step):
@@ -176,18 +181,27 @@ def make_find_candidates(features):
         one, two = workspace.solid[0], workspace.solid[1]
         gather_motion(crowd.frame, first, one)
         gather_motion(crowd.frame, second, two)
+        if axial:
+            gather_pose(crowd.frame, first, one)
+            gather_velocity(crowd.frame, first, one)
+            gather_pose(crowd.frame, second, two)
+            gather_velocity(crowd.frame, second, two)
         exhausted = 0
         for k in range(model.half_pair.shape[0]):
             half_pair, live = model.half_pair[k], workspace.half_pair[k]
             least = renewal(half_pair, impulse) if starts_collision_step else 0.0
             owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
-            exhausted += spend_skin(owner, surface, half_pair, live, least)
+            lacking = spend_skin(owner, surface, half_pair, live, least)
+            if axial and half_pair.axial != 0:
+                lacking = spare_spin(owner, half_pair, live, least)
+            exhausted += lacking
         if exhausted == 0 and not has_candidates(workspace):
             return False
         mark_lanes(workspace.lane[0], first, True)
-        gather_pose(crowd.frame, first, one)
-        gather_pose(crowd.frame, second, two)
-        if compound:
+        if not axial:
+            gather_pose(crowd.frame, first, one)
+            gather_pose(crowd.frame, second, two)
+        if compound and not axial:
             gather_velocity(crowd.frame, first, one)
             gather_velocity(crowd.frame, second, two)
         compound_frames(model, workspace)

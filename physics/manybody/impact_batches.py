@@ -10,7 +10,6 @@ from physics.impulse.impact_points import (
     add_half_impulses,
     make_find_impacts,
     make_impact_sweep,
-    remove_half_impulses,
     remove_push_out,
 )
 from physics.impulse.point_impulses import operands_of
@@ -85,8 +84,8 @@ def make_half_impulse_batch(features):
     """Sequence that adds the half impulses of a batch, a part of the last ones, or removes them."""
 
     @sequence
-    def half_impulse_batch(all_model, workspace, rows, crowd, pairs, b, part):
-        """`part`: 0 removes them."""
+    def half_impulse_batch(all_model, workspace, rows, crowd, pairs, b, part, attempt):
+        """`attempt`: see `add_half_impulses`."""
         everyone = workspace.lane[0].colliding
         for i in range(LANES):
             everyone[i] = 1
@@ -96,10 +95,7 @@ def make_half_impulse_batch(features):
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
-                if part > 0.0:
-                    add_half_impulses(operands_of(model, mine, k), everyone, part)
-                else:
-                    remove_half_impulses(operands_of(model, mine, k))
+                add_half_impulses(operands_of(model, mine, k), everyone, part, attempt)
         scatter_speeds(crowd, pairs, b, workspace)
         return 0
 

@@ -159,7 +159,7 @@ def make_collide(features):
                     stamp = resolve(model, workspace, rows, crowd, pairs, refresh, team, stamp)
                     collided = True
             if part > 0.0 and attempt != 1:
-                options = (part if attempt == 0 else 0.0,)
+                options = (part, attempt)
                 half_impulses(model, workspace, rows, crowd, pairs, team, options)
             if attempt == 0:
                 push_out(model, workspace, rows, crowd, pairs, team, (stamp,))

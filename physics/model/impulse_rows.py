@@ -29,6 +29,7 @@ CONTACT_ROW = np.dtype(
         # over the last one, see impulse/contact_rows.py
         ("bend", "f8", (LANES,)),
         ("last_bend", "f8", (LANES,)),
+        ("turned", "f8", (LANES,)),  # m/s, part of u n by a spin that moves no sample
         ("approach", "f8", (LANES,)),  # m/s, in the last drift
         ("rest_speed", "f8", (LANES,)),  # m/s, closing speed up to which it counts as at rest
         # 1: what pushed its solids apart in the last step has been removed before a collision

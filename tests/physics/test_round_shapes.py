@@ -110,6 +110,22 @@ def test_on_an_incline_round_sides_roll_by_their_inertia_and_flat_ones_hold(law)
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("turn", [0.1, 0.3, 0.6])
+def test_what_rolls_fast_rolls_straight_on(law, turn):
+    """By `turn` rad in a substep. Leading samples of the drum come down fast, but never arrive."""
+    world, index = world_of(law), NAMES.index("drum on its side")
+    velocity, spin = np.zeros((1, 6, 3)), np.zeros((1, 6, 3))
+    spin[0, index, 1] = turn / world.fidelity.substep
+    velocity[0, index, 0] = 0.02 * spin[0, index, 1]
+    world.set_state(linear_velocity=velocity, angular_velocity=spin)
+    world.advance(1.0)
+    v, w = world.linear_velocity[0, index], world.angular_velocity[0, index]
+    assert v == pytest.approx(velocity[0, index], abs=2e-4 * velocity[0, index, 0])
+    assert w == pytest.approx(spin[0, index], abs=2e-3 * spin[0, index, 1])
+    assert world.position[0, index, 2] == pytest.approx(0.02, abs=2e-4)
+
+
+@pytest.mark.parametrize("law", LAWS)
 def test_what_lies_flat_slides_where_it_is_steeper_than_friction_holds(law):
     angle = math.radians(15)
     world = world_of(law, angle, friction=0.1)
