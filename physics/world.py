@@ -10,6 +10,7 @@ from physics.analysis.failures import failure
 from physics.analysis.integrator_limits import check_integrator
 from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.parameter_limits import ParameterLimits
+from physics.analysis.soft_supports import warn_of_soft_supports
 from physics.analysis.solids import Solids
 from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import check_step
@@ -108,6 +109,7 @@ class World(Readings):
             check_integrator(scene, self.fidelity, self._simulation.base)
             if not allow_unstable:
                 check_step(scene, self.fidelity, self._simulation.base, self.features)
+                warn_of_soft_supports(scene, self.fidelity, self._simulation.base)
         self._limits = ParameterLimits(scene, self.fidelity)
         self._solids = Solids(scene.solid_names, self._queries.can_touch)
 
