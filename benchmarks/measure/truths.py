@@ -7,46 +7,63 @@ ratios unless a unit is given.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 
+from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity
 from physics.reference import loads
-from physics.reference.truths import ROWS
+from physics.reference.truths import ROWS, Engine
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
+
+
+def _peer() -> dict[str, Engine]:
+    """MuJoCo at its default step of 2 ms, if it is installed."""
+    if find_spec("mujoco") is None:
+        return {}
+    worlds = import_module("benchmarks.peers.mujoco_worlds").MujocoWorlds
+    return {"MuJoCo, 2 ms": lambda scene, count: worlds(scene, MujocoOptions(), count)}
 
 
 def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.1f}"
 
 
-def _tipping(slow: bool, size: float) -> Callable[[Fidelity], str]:
-    def cell(level: Fidelity) -> str:
-        predicted = loads.predicted_tipping(level, size)
+def _tipping(slow: bool, size: float) -> Callable[[Engine], str]:
+    def cell(engine: Engine) -> str:
+        found = _degrees(loads.tipping_slope(engine, slow, size))
+        if callable(engine):
+            return found
+        predicted = loads.predicted_tipping(engine, size)
         bound = _degrees(predicted.gradual) if slow else f"≥ {_degrees(predicted.sudden)}"
-        return f"{_degrees(loads.tipping_slope(level, slow, size))} ({bound})"
+        return f"{found} ({bound})"
 
     return cell
 
 
-def _pull(part: float, slow: bool) -> Callable[[Fidelity], str]:
-    def cell(level: Fidelity) -> str:
-        moved, speed = loads.pulled(level, part, slow)
-        predicted = loads.predicted_pull(level, part)
+def _pull(part: float, slow: bool) -> Callable[[Engine], str]:
+    def cell(engine: Engine) -> str:
+        moved, speed = loads.pulled(engine, part, slow)
+        found = f"{speed:.4f}" if part > 1.0 else f"{1e3 * moved:.2g}"
+        if callable(engine):
+            return found
+        predicted = loads.predicted_pull(engine, part)
         if part > 1.0:
             most = 2.0 * (part - 1.0) * loads.FRICTION * loads.GRAVITY + predicted.speed
-            return f"{speed:.4f} (≤ {most:.4f})"
+            return f"{found} (≤ {most:.4f})"
         bound = f"{1e3 * predicted.gradual:.2g}" if slow else f"≤ {1e3 * predicted.sudden:.2g}"
-        return f"{1e3 * moved:.2g} ({bound})"
+        return f"{found} ({bound})"
 
     return cell
 
 
-def _leaning(slow: bool) -> Callable[[Fidelity], str]:
-    return lambda level: "; ".join(_degrees(angle) for angle in loads.leaning(level, slow))
+def _leaning(slow: bool) -> Callable[[Engine], str]:
+    return lambda engine: "; ".join(_degrees(angle) for angle in loads.leaning(engine, slow))
 
 
-def _loads() -> tuple[tuple[str, str, Callable[[Fidelity], str]], ...]:
+def _loads() -> tuple[tuple[str, str, Callable[[Engine], str]], ...]:
     """Name of a load, right value, and the measured one at a fidelity, with the predicted one."""
     right = _degrees(math.atan2(*loads.BOX))
     stick = _degrees(loads.leaning_angle())

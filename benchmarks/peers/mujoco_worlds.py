@@ -77,6 +77,12 @@ class MujocoWorlds:
         for data in self._data:
             mujoco.mj_step(self._model, data, nstep=steps)
 
+    def apply_wrench(self, force: Any) -> None:
+        """Pulls at the centres by forces that broadcast to [count, bodies, 3] N from now on."""
+        forces = np.broadcast_to(force, (self.count, self._bodies, 3))
+        for data, own in zip(self._data, forces, strict=True):
+            data.xfrc_applied[1 : 1 + self._bodies, :3] = own
+
     def snapshot(self) -> Array:
         """The states of all worlds."""
         spec = mujoco.mjtState.mjSTATE_INTEGRATION

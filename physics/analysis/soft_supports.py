@@ -25,6 +25,10 @@ Array = np.ndarray
 DEEP = 0.1
 
 
+class SoftSupport(UserWarning):
+    """A body would sink by more than `DEEP` of its width at rest."""
+
+
 def warn_of_soft_supports(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     """Warns of the contact that is deepest for its width, and says what would be right."""
     gravity, bodies = math.hypot(*scene.gravity), scene.bodies
@@ -57,6 +61,7 @@ def warn_of_soft_supports(scene: Scene, fidelity: Fidelity, model: Model) -> Non
         f"{loads[upper]:.3g} kg, those above it included, and sinks into it by {1e3 * depth:.3g} "
         f"mm at rest, {100.0 * worst:.3g} % of the width of the narrower one; for at most "
         f"{100.0 * DEEP:g} % use {_better(scene, fidelity, worst)}",
+        SoftSupport,
         stacklevel=3,
     )
 

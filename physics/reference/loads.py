@@ -7,13 +7,14 @@ more.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
 from physics.analysis.standing import Base, Pull, Tipping, base, pull, tipping
 from physics.model.build import build
 from physics.model.rocking import outward_sides
-from physics.reference.truths import GRAVITY, MASS, Level
+from physics.reference.truths import GRAVITY, MASS, Engine, Level, worlds_of
 from physics.scene.material import Material
 from physics.scene.scene import Scene
 from physics.scene.shapes import Box, Capsule
@@ -30,14 +31,14 @@ _STEPS = 100  # in which a load grows
 
 
 def _standing(
-    level: Level, half_extents: tuple[float, ...], material: Material, count: int
-) -> World:
+    engine: Engine, half_extents: tuple[float, ...], material: Material, count: int
+) -> Any:
     a, b, c = half_extents
     box = Body(Box((a, b, c)), mass=MASS, position=(0.0, 0.0, c), material=material)
-    return World(Scene([box], [Ground(material=material)]), level, count)
+    return worlds_of(engine, Scene([box], [Ground(material=material)]), count)
 
 
-def _load(world: World, force: Array, seconds: float, slow: bool) -> None:
+def _load(world: Any, force: Array, seconds: float, slow: bool) -> None:
     """Pulls at the centre by a force [worlds, 3] for a time, and as long before while it grows."""
     for n in range(_STEPS if slow else 0):
         world.apply_wrench(force=(n + 1) / _STEPS * force[:, None])
@@ -47,13 +48,13 @@ def _load(world: World, force: Array, seconds: float, slow: bool) -> None:
         world.advance(seconds / _STEPS)
 
 
-def _fallen(world: World) -> Array:
+def _fallen(world: Any) -> Array:
     x, y = world.orientation[:, 0, :2].T
     return np.asarray(1.0 - 2.0 * (x**2 + y**2) < _TILTED)
 
 
 def tipping_slope(
-    level: Level, slow: bool, size: float = 1.0, restitution: float = 0.0, count: int = 64
+    engine: Engine, slow: bool, size: float = 1.0, restitution: float = 0.0, count: int = 64
 ) -> float:
     """The least slope in rad on which a box `BOX` tips, times `size`, that is set down at rest.
 
@@ -62,7 +63,7 @@ def tipping_slope(
     The least of `count` slopes from an eighth of it to an eighth beyond.
     """
     width, height = (size * x for x in BOX)
-    world = _standing(level, (width, width, height), Material(1.0, restitution), count)
+    world = _standing(engine, (width, width, height), Material(1.0, restitution), count)
     slopes = np.linspace(0.125, 1.125, count) * math.atan2(width, height)
     force, seconds = np.zeros((count, 3)), 2.0 * math.sqrt(size)
     if slow:
@@ -93,13 +94,13 @@ def predicted_tipping(level: Level, size: float = 1.0) -> Tipping:
     return tipping(stands, sink)
 
 
-def pulled(level: Level, part: float, slow: bool) -> tuple[float, float]:
+def pulled(engine: Engine, part: float, slow: bool) -> tuple[float, float]:
     """Displacement in m and speed in m/s of a cube of 4 cm, 2 s after a pull of `part` mu m g.
 
     Right: 0 and 0 for a part below 1; above it, and for a load that comes at once, the speed is
     (part - 1) mu g t.
     """
-    world = _standing(level, (0.02, 0.02, 0.02), Material(FRICTION), 1)
+    world = _standing(engine, (0.02, 0.02, 0.02), Material(FRICTION), 1)
     world.advance(1.0)
     start = float(world.position[0, 0, 0])
     _load(world, np.array([[part * FRICTION * MASS * GRAVITY, 0.0, 0.0]]), 2.0, slow)
@@ -125,7 +126,7 @@ def leaning_angle() -> float:
     return math.acos(rest / size) - math.acos(phase / size)
 
 
-def leaning(level: Level, slow: bool, count: int = 64) -> tuple[float, float]:
+def leaning(engine: Engine, slow: bool, count: int = 64) -> tuple[float, float]:
     """Angles in rad of the stick that leans least and stays: at which it was put, and stands.
 
     It is put there at rest; with `slow` its weight grows over a second. Right: both
@@ -135,7 +136,7 @@ def leaning(level: Level, slow: bool, count: int = 64) -> tuple[float, float]:
     rough = Material(FRICTION)
     stick = Body(Capsule(radius, 0.5 * length), mass=MASS, material=rough)
     wall = Static(Box((0.05, 0.5, 0.5)), position=(0.05, 0.0, 0.5), material=rough)
-    world = World(Scene([stick], [Ground(material=rough), wall]), level, count)
+    world = worlds_of(engine, Scene([stick], [Ground(material=rough), wall]), count)
     angles = np.linspace(0.93, 1.25, count) * leaning_angle()
     position, orientation = np.zeros((count, 1, 3)), np.zeros((count, 1, 4))
     position[:, 0, 0] = -radius - 0.5 * length * np.cos(angles)

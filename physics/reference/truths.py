@@ -6,6 +6,7 @@ returns what its docstring says; the right value stands beside it. Bodies have 0
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from physics.world import World
 
 Array = np.ndarray
 Level = str | Fidelity
+# how a scene is simulated: at a fidelity, or in what builds a number of worlds of it
+Engine = Level | Callable[[Scene, int], Any]
 
 GRAVITY = 9.81
 MASS = 0.1
@@ -30,6 +33,11 @@ DOME = 0.5  # m
 BLOCK = (0.015, 0.06)  # m, half width and half height of the block that rocks
 # Housner (1963): angular velocity after and before the impact of a slim block on its other edge
 ROCKING = 1.0 - 1.5 * BLOCK[0] ** 2 / (BLOCK[0] ** 2 + BLOCK[1] ** 2)
+
+
+def worlds_of(engine: Engine, scene: Scene, count: int = 1) -> Any:
+    """`count` worlds of a scene, or what an engine of another kind builds of it."""
+    return engine(scene, count) if callable(engine) else World(scene, engine, count)
 
 
 def _step(level: Level, longest: float) -> float:

@@ -1,6 +1,7 @@
 """explain: what a fidelity models of a scene and what it leaves out, its limits and its cost."""
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from physics.analysis.field_limits import longest_step
+from physics.analysis.soft_supports import SoftSupport
 from physics.analysis.step_limits import largest_safe_step
 from physics.manybody.limits import neighbourhoods
 from physics.model.build import build
@@ -233,7 +235,9 @@ def _largest_step(scene: Scene, few: Scene, fidelity: Fidelity) -> tuple[float, 
 def _refusal(scene: Scene, fidelity: Fidelity) -> str:
     """Why a World refuses a fidelity; "" if it doesn't."""
     try:
-        World(scene, fidelity)
+        with warnings.catch_warnings():  # the sinks are listed
+            warnings.simplefilter("ignore", SoftSupport)
+            World(scene, fidelity)
     except ValueError as error:
         return str(error)
     return ""

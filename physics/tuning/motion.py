@@ -1,6 +1,7 @@
 """The motion of a scene at a fidelity, read at regular times, and what it cost."""
 
 import math
+import warnings
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from time import perf_counter
@@ -8,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.analysis.soft_supports import SoftSupport
 from physics.compiler.jit import LANES
 from physics.errors import SimulationDiverged
 from physics.manybody.simulation import MANY
@@ -136,7 +138,9 @@ def simulate(
 
 def _world(course: Course, fidelity: Fidelity) -> World:
     kernel = requested(None, "special")  # as in training: its cost is what counts
-    return World(course.scene, fidelity, course.worlds, threads=1, kernel=kernel)
+    with warnings.catch_warnings():  # of candidates, most of which aren't chosen
+        warnings.simplefilter("ignore", SoftSupport)
+        return World(course.scene, fidelity, course.worlds, threads=1, kernel=kernel)
 
 
 def compile_for(course: Course, fidelities: Iterable[Fidelity]) -> None:
