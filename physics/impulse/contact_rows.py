@@ -23,8 +23,8 @@ the ground, and throw it into the air.)
 
 A contact is at rest if it closes by no more than the speed that its load gives it in a short time,
 `HALF_PAIR.rest_time`. The load is what pressed the contact in the last step, or what made it close
-faster since the impacts of that step (`sweep.approach_after_impacts`); what the known forces would
-do, where the last step isn't known. Bodies that fall freely side by side have none, and an edge
+faster since the impacts of that step; what the known forces would do, where the last step isn't
+known. Bodies that fall freely side by side have none, and an edge
 that a block rocks down onto has little. Of several contacts of a pair some bear nothing, and
 tremble: so a contact is also at rest if it closes by no more than the speed that all that pressed
 its pair gives the pair's mass in one step, which no step resolves.

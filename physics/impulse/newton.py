@@ -30,7 +30,7 @@ from physics.impulse.newton_step import (
     set_changes,
 )
 from physics.impulse.point_impulses import apply_impulse, operands_of, relative_velocity
-from physics.impulse.sweep import anchor_kept, approach_after_impacts, arrives
+from physics.impulse.sweep import anchor_kept, arrives
 from physics.model.features import cached_by_features
 
 # per substep, at most
@@ -51,7 +51,7 @@ def mark_separating(pair, separates):
             un = ux * point.normal[0, i] + uy * point.normal[1, i] + uz * point.normal[2, i]
             un -= point.last_bend[i]
             point.arrives[i] = arrives(point, i, un)
-            point.approach[i] = approach_after_impacts(point, i, un)
+            point.approach[i] = -(un + point.last_bend[i])  # after impacts, before forces
             found = (point.normal_impulse[i] > 0.0) & (point.relaxed[i] == 0.0)
             found = found & (un > ACCURACY * point.rest_speed[i])
             separates[i] = 1 if found else separates[i]

@@ -60,12 +60,6 @@ def arrives(point, i, rate):
 
 
 @stage
-def approach_after_impacts(point, i, rate):
-    """m/s, from which the forces of the step change it; `rate`: less `last_bend`, after impacts."""
-    return -(rate + point.last_bend[i]) if point.relaxed[i] != 0.0 else point.approach[i]
-
-
-@stage
 def anchor_kept(h, slides):
     """Factor of an anchor in a step."""
     return 0.0 if slides else 1.0 - h * ANCHOR_DECAY
@@ -139,7 +133,7 @@ def make_sweep(features):
                 least = 0.0
                 if not soft:
                     point.arrives[i] = arrives(point, i, un)
-                    point.approach[i] = approach_after_impacts(point, i, un)
+                    point.approach[i] = -(un + point.last_bend[i])  # after impacts, before forces
                     # after a collision solids separate, but not because they were pushed apart
                     least = before if point.relaxed[i] != 0.0 else 0.0
                 new = max(before - mass * (un + bias) - leak * before, least)

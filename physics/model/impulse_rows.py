@@ -30,7 +30,7 @@ CONTACT_ROW = np.dtype(
         ("bend", "f8", (LANES,)),
         ("last_bend", "f8", (LANES,)),
         ("turned", "f8", (LANES,)),  # m/s, part of u n by a spin that moves no sample
-        ("approach", "f8", (LANES,)),  # m/s, in the last drift
+        ("approach", "f8", (LANES,)),  # m/s, in the last drift; then after the impacts of the step
         ("rest_speed", "f8", (LANES,)),  # m/s, closing speed up to which it counts as at rest
         # 1: what pushed its solids apart in the last step has been removed before a collision
         ("relaxed", "f8", (LANES,)),
