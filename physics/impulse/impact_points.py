@@ -72,13 +72,12 @@ def make_find_impacts(features):
 
 
 @stage
-def add_half_impulses(pair, colliding, part, attempt):
+def add_half_impulses(pair, colliding, part, adds):
     """Adds what contacts give up to the present time: a part of their impulses of the last step.
 
-    Only in lanes with a collision, or the others would be rounded. After the first `attempt` it
-    removes them again.
+    Only in lanes with a collision, or the others would be rounded. Or it removes them again.
     """
-    points, adds = pair.points, attempt == 0
+    points = pair.points
     for n in range(points.shape[0]):
         point = points[n]
         normal, tangential, half = point.normal, point.tangential_impulse, point.half_impulse

@@ -316,7 +316,8 @@ def make_impacts(features):
                 continue
             for k in range(half_pairs):
                 if workspace.half_pair[k].slots > 0:
-                    add_half_impulses(operands_of(model, workspace, k), colliding, part, attempt)
+                    pair, adds = operands_of(model, workspace, k), attempt == 0
+                    add_half_impulses(pair, colliding, part, adds)
             if attempt == 0:
                 for k in range(half_pairs):
                     if workspace.half_pair[k].slots > 0:

@@ -1,7 +1,7 @@
 """What an instantaneous collision does with one batch of pairs, see `impulse.restitution`.
 
 Only pairs with a body whose velocity a collision has changed take part; bodies carry the stamp of
-the last sweep that changed them.
+the last operation that changed them.
 """
 
 from physics.compiler.bundles import bundle
@@ -29,6 +29,9 @@ from physics.manybody.impulse_batches import (
 from physics.manybody.team import FASTEST, RESTITUTION
 from physics.model.features import cached_by_features
 from physics.model.workspace import GIVEN
+
+# what a collision does with all pairs, see `impact_steps.make_collide`
+FIND, ADD_HALVES, REMOVE_PUSH_OUT, SWEEP, RESTITUTE, ADD_WORK, SCALE, REMOVE_HALVES, DONE = range(9)
 
 
 @cached_by_features
@@ -73,192 +76,93 @@ def stir(crowd, p, stamp):
 
 @stage
 def is_stirred(crowd, pairs, b, i, since):
-    """Whether a body of a pair has changed its velocity since a sweep."""
+    """Whether a body of a pair has changed its velocity since a stamp."""
     bodies, p, q = crowd.stirred.shape[0], pairs.first[b, i], pairs.second[b, i]
     one = p >= 0 and crowd.stirred[p] >= since
     return one or (q >= 0 and q < bodies and crowd.stirred[q] >= since)
 
 
-@cached_by_features
-def make_half_impulse_batch(features):
-    """Sequence that adds the half impulses of a batch, a part of the last ones, or removes them."""
-
-    @sequence
-    def half_impulse_batch(all_model, workspace, rows, crowd, pairs, b, part, attempt):
-        """`attempt`: see `add_half_impulses`."""
-        everyone = workspace.lane[0].colliding
-        for i in range(LANES):
-            everyone[i] = 1
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        gather_tensors(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                add_half_impulses(operands_of(model, mine, k), everyone, part, attempt)
-        scatter_speeds(crowd, pairs, b, workspace)
-        return 0
-
-    return half_impulse_batch
+@stage
+def begin_operation(workspace, crowd, pairs, b, operation, value, stamp):
+    """Marks the lanes of a batch that take part in `LANE.unconverged`; returns how many do."""
+    lane, some = workspace.lane[0], 0
+    for i in range(LANES):
+        involved = True
+        if operation in (REMOVE_PUSH_OUT, SWEEP):
+            involved = is_stirred(crowd, pairs, b, i, stamp)
+        elif operation != ADD_HALVES and operation != REMOVE_HALVES:
+            involved = pairs.colliding[b, i] != 0
+        lane.unconverged[i] = 1 if involved else 0
+        lane.largest_change[i] = 0.0
+        lane.impact_restitution[i] = 0.0
+        lane.impact_work[i] = 0.0
+        lane.end_work[i] = 0.0
+        lane.restitution_scale[i] = value
+        some += lane.unconverged[i]
+    return some
 
 
-@cached_by_features
-def make_push_out_batch(features):
-    """Sequence that removes the velocity that pushed bodies apart, where one of them collides."""
-
-    @sequence
-    def push_out_batch(all_model, workspace, rows, crowd, pairs, b, since):
-        lane, some = workspace.lane[0], 0
-        for i in range(LANES):
-            lane.colliding[i] = 1 if is_stirred(crowd, pairs, b, i, since) else 0
-            some += lane.colliding[i]
-        if some == 0:
-            return 0
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        gather_tensors(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                remove_push_out(operands_of(model, mine, k), lane.colliding)
-        scatter_speeds(crowd, pairs, b, workspace)
-        return 0
-
-    return push_out_batch
+@stage
+def end_operation(workspace, crowd, pairs, b, operation, value, stamp, extremes):
+    """Notes the work and which bodies have changed; returns the number of pairs that have."""
+    lane, changed = workspace.lane[0], 0
+    for i in range(LANES):
+        pairs.impact_work[b, i] += lane.impact_work[i] + lane.end_work[i]
+        extremes[RESTITUTION] = max(extremes[RESTITUTION], lane.impact_restitution[i])
+        if operation == SWEEP:
+            pairs.colliding[b, i] = max(pairs.colliding[b, i], lane.unconverged[i])
+            changes = lane.largest_change[i] > TOLERANCE * value
+        else:
+            changes = operation in (RESTITUTE, SCALE) and lane.unconverged[i] != 0
+        if changes:
+            stir(crowd, pairs.first[b, i], stamp + 1)
+            stir(crowd, pairs.second[b, i], stamp + 1)
+            changed += 1
+    return changed
 
 
 @cached_by_features
 def make_impact_batch(features):
-    """Sequence of one sweep of the impacts of a batch: of the pairs with a body that changed."""
+    """Sequence of any operation on a batch but FIND: all share what copies the velocities."""
     impact_sweep = make_impact_sweep(features)
 
     @sequence
-    def impact_batch(all_model, workspace, rows, crowd, pairs, b, since, stamp, fastest):
-        """Bodies whose velocity changes by more than round-off are stirred at `stamp`."""
-        lane, some = workspace.lane[0], 0
-        for i in range(LANES):
-            lane.unconverged[i] = 1 if is_stirred(crowd, pairs, b, i, since) else 0
-            lane.largest_change[i] = 0.0
-            lane.impact_work[i] = 0.0
-            pairs.colliding[b, i] = max(pairs.colliding[b, i], lane.unconverged[i])
-            some += lane.unconverged[i]
-        if some == 0:
+    def impact_batch(
+        all_model, workspace, rows, crowd, pairs, b, operation, value, stamp, extremes
+    ):
+        """Stirs bodies whose velocities change, at `stamp` + 1; returns the number of such pairs.
+
+        With SWEEP a change of round-off doesn't count.
+
+        `value`: with SWEEP the fastest approach in m/s, with SCALE the fraction of the impulses
+        that is left, with ADD_HALVES the part of the last impulses; `extremes`: of the thread.
+        """
+        if begin_operation(workspace, crowd, pairs, b, operation, value, stamp) == 0:
             return 0
         tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
+        model, mine, lane = bundle(tables), bundle(arrays), workspace.lane[0]
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                pair, mu = operands_of(model, mine, k), model.half_pair[k].friction
-                impact_sweep(pair, mu, lane)
+            if mine.half_pair[k].slots == 0:
+                continue
+            pair = operands_of(model, mine, k)
+            if operation == SWEEP:
+                impact_sweep(pair, model.half_pair[k].friction, lane)
+            elif operation == RESTITUTE:
+                apply_restitution(pair, lane)
+            elif operation == ADD_WORK:
+                add_end_work(pair, lane)
+            elif operation == SCALE:
+                scale_impacts(pair, lane)
+            elif operation == REMOVE_PUSH_OUT:
+                remove_push_out(pair, lane.unconverged)
+            else:
+                add_half_impulses(pair, lane.unconverged, value, operation == ADD_HALVES)
         scatter_speeds(crowd, pairs, b, workspace)
-        moved = 0
-        for i in range(LANES):
-            pairs.impact_work[b, i] += lane.impact_work[i]
-            if lane.largest_change[i] > TOLERANCE * fastest:
-                stir(crowd, pairs.first[b, i], stamp)
-                stir(crowd, pairs.second[b, i], stamp)
-                moved += 1
-        return moved
+        return end_operation(workspace, crowd, pairs, b, operation, value, stamp, extremes)
 
     return impact_batch
-
-
-@stage
-def takes_part(pairs, b):
-    """Whether any pair of a batch collides or has been swept since."""
-    some = 0
-    for i in range(LANES):
-        some += pairs.colliding[b, i]
-    return some > 0
-
-
-@stage
-def stir_batch(crowd, pairs, b, stamp):
-    """Notes that the velocities of a batch's pairs that take part have changed."""
-    for i in range(LANES):
-        if pairs.colliding[b, i] != 0:
-            stir(crowd, pairs.first[b, i], stamp)
-            stir(crowd, pairs.second[b, i], stamp)
-
-
-@cached_by_features
-def make_restitution_batch(features):
-    """Sequence that applies restitution to the pairs of a batch that take part."""
-
-    @sequence
-    def restitution_batch(all_model, workspace, rows, crowd, pairs, b, extremes, stamp):
-        """Writes the largest restitution of the thread so far."""
-        if not takes_part(pairs, b):
-            return 0
-        lane = workspace.lane[0]
-        for i in range(LANES):
-            lane.impact_restitution[i] = 0.0
-            lane.impact_work[i] = 0.0
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        gather_tensors(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                apply_restitution(operands_of(model, mine, k), lane)
-        scatter_speeds(crowd, pairs, b, workspace)
-        for i in range(LANES):
-            pairs.impact_work[b, i] += lane.impact_work[i]
-            extremes[RESTITUTION] = max(extremes[RESTITUTION], lane.impact_restitution[i])
-        stir_batch(crowd, pairs, b, stamp)
-        return 0
-
-    return restitution_batch
-
-
-@cached_by_features
-def make_end_work_batch(features):
-    """Sequence that writes the work of `add_end_work` of a batch to `impact_work`."""
-
-    @sequence
-    def end_work_batch(all_model, workspace, rows, crowd, pairs, b):
-        if not takes_part(pairs, b):
-            return
-        lane = workspace.lane[0]
-        for i in range(LANES):
-            lane.end_work[i] = 0.0
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                add_end_work(operands_of(model, mine, k), lane)
-        for i in range(LANES):
-            pairs.impact_work[b, i] = lane.end_work[i]
-
-    return end_work_batch
-
-
-@cached_by_features
-def make_scale_batch(features):
-    """Sequence that takes back all but a fraction of the impulses since compression."""
-
-    @sequence
-    def scale_batch(all_model, workspace, rows, crowd, pairs, b, scale, stamp):
-        if not takes_part(pairs, b):
-            return 0
-        lane = workspace.lane[0]
-        for i in range(LANES):
-            lane.restitution_scale[i] = scale
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        gather_tensors(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                scale_impacts(operands_of(model, mine, k), lane)
-        scatter_speeds(crowd, pairs, b, workspace)
-        stir_batch(crowd, pairs, b, stamp)
-        return 0
-
-    return scale_batch
 
 
 @cached_by_features

@@ -11,14 +11,18 @@ from physics.impulse.restitution import MAX_SWEEPS, allowed_fraction
 from physics.manybody.colours import make_by_colour
 from physics.manybody.couplings import make_begin_joints, make_keep_joints
 from physics.manybody.impact_batches import (
+    ADD_HALVES,
+    ADD_WORK,
+    DONE,
+    FIND,
+    REMOVE_HALVES,
+    REMOVE_PUSH_OUT,
+    RESTITUTE,
+    SCALE,
+    SWEEP,
     make_book_impacts,
-    make_end_work_batch,
     make_find_batch_impacts,
-    make_half_impulse_batch,
     make_impact_batch,
-    make_push_out_batch,
-    make_restitution_batch,
-    make_scale_batch,
     stir,
 )
 from physics.manybody.team import (
@@ -84,60 +88,15 @@ def make_find(features):
 
 @cached_by_features
 def make_collide(features):
-    """Sequence of all instantaneous collisions of a substep."""
+    """Sequence of all instantaneous collisions of a substep.
+
+    What collides is found, and what of it still does without the push apart. It is compressed, gets
+    restitution, and gives back what that returned too much. These operations follow each other in a
+    loop that calls each stage in one place, because every further call would be compiled anew.
+    """
     find, book_impacts = make_find(features), make_book_impacts(features)
-    half_impulses = make_by_colour(features, make_half_impulse_batch(features))
-    push_out = make_by_colour(features, make_push_out_batch(features))
-    sweep = make_by_colour(features, make_impact_batch(features))
-    restitute = make_by_colour(features, make_restitution_batch(features))
-    add_end_work = make_end_work_batch(features)
-    scale_back = make_by_colour(features, make_scale_batch(features))
+    change = make_by_colour(features, make_impact_batch(features))
     begin_joints, keep_joints = make_begin_joints(features), make_keep_joints(features)
-
-    @sequence
-    def solve(model, workspace, rows, crowd, pairs, fastest, team, stamp):
-        """Sweeps until no velocity changes; only pairs with a body that the last sweep changed."""
-        for _ in range(MAX_SWEEPS):
-            options = (stamp, stamp + 1, fastest)
-            team.shared[team.thread, CHANGED] = sweep(
-                model, workspace, rows, crowd, pairs, team, options
-            )
-            stamp += 1
-            keep_joints(model, workspace, crowd, pairs, stamp, 0.0, team)
-            if total(team, CHANGED) == 0.0:
-                break
-        return stamp
-
-    @sequence
-    def resolve(model, workspace, rows, crowd, pairs, refresh, team, stamp):
-        """Compression and restitution of all that collides; returns the last stamp."""
-        begin_joints(model, workspace, crowd, True, True, 0.0, team)
-        fastest, mine, compression = largest(team, FASTEST), team.shared[team.thread], 0.0
-        mine[RESTITUTION] = 0.0
-        for part in range(2):
-            if part == 1:
-                compression = all_work(crowd, pairs, team)
-                stamp += 1
-                restitute(model, workspace, rows, crowd, pairs, team, (mine, stamp))
-                keep_joints(model, workspace, crowd, pairs, stamp, 0.0, team)
-            stamp = solve(model, workspace, rows, crowd, pairs, fastest, team, stamp)
-        e, work = largest(team, RESTITUTION), all_work(crowd, pairs, team)
-        allowed = e * e * max(-compression, 0.0)
-        if work > allowed:
-            for n in range(crowd.order.shape[0]):
-                b = crowd.order[n]
-                if takes_batch(n, team) and pairs.busy[b] != 0:
-                    add_end_work(model, workspace, rows, crowd, pairs, b)
-            scale = allowed_fraction(work, all_work(crowd, pairs, team), allowed)
-            stamp += 1
-            scale_back(model, workspace, rows, crowd, pairs, team, (scale, stamp))
-            keep_joints(model, workspace, crowd, pairs, stamp, 0.0, team)
-        for n in range(crowd.order.shape[0]):
-            b = crowd.order[n]
-            if takes_batch(n, team) and pairs.busy[b] != 0:
-                book_impacts(model, workspace, rows, crowd, pairs, b, refresh)
-        wait(team)
-        return stamp
 
     @sequence
     def collide(model, workspace, rows, crowd, pairs, h, refresh, part, team, stamp):
@@ -145,24 +104,59 @@ def make_collide(features):
 
         `part`: see `restitution.make_find_impacts`.
         """
-        collided = False
-        # what collides, what still does without the push apart, and the end: each stage is called
-        # in one place, because two calls would be compiled twice
-        for attempt in range(3):
-            if attempt < 2:
+        mine, sweeps, compression, work, allowed = team.shared[team.thread], 0, 0.0, 0.0, 0.0
+        mine[RESTITUTION] = 0.0
+        again, collided, restored = False, False, False
+        first = ADD_HALVES if part > 0.0 else REMOVE_PUSH_OUT
+        last = REMOVE_HALVES if part > 0.0 else DONE
+        operation, value = FIND, part
+        while operation != DONE:
+            if operation == FIND:
                 stamp += 1
-                left = part if attempt == 0 else 0.0
-                if find(model, workspace, rows, crowd, pairs, h, team, stamp, False, left) == 0.0:
-                    if attempt == 0:
-                        return stamp, False
-                elif attempt == 1:
-                    stamp = resolve(model, workspace, rows, crowd, pairs, refresh, team, stamp)
-                    collided = True
-            if part > 0.0 and attempt != 1:
-                options = (part, attempt)
-                half_impulses(model, workspace, rows, crowd, pairs, team, options)
-            if attempt == 0:
-                push_out(model, workspace, rows, crowd, pairs, team, (stamp,))
+                collides = find(model, workspace, rows, crowd, pairs, h, team, stamp, False, value)
+                if not again:
+                    again, operation = True, first if collides > 0.0 else DONE
+                elif collides > 0.0:
+                    begin_joints(model, workspace, crowd, True, True, 0.0, team)
+                    collided, operation, value = True, SWEEP, largest(team, FASTEST)
+                else:
+                    operation = last
+                continue
+            options = (operation, value, stamp, mine)
+            mine[CHANGED] = change(model, workspace, rows, crowd, pairs, team, options)
+            if operation in (SWEEP, RESTITUTE, SCALE):
+                stamp += 1
+                keep_joints(model, workspace, crowd, pairs, stamp, 0.0, team)
+            if operation == ADD_HALVES:
+                operation = REMOVE_PUSH_OUT
+            elif operation == REMOVE_PUSH_OUT:
+                operation, value = FIND, 0.0
+            elif operation == SWEEP:
+                sweeps += 1
+                if total(team, CHANGED) > 0.0 and sweeps < MAX_SWEEPS:
+                    continue
+                work = all_work(crowd, pairs, team)
+                if restored:
+                    e = largest(team, RESTITUTION)
+                    allowed = e * e * max(-compression, 0.0)
+                    operation = ADD_WORK if work > allowed else last
+                else:
+                    operation, restored, compression, sweeps = RESTITUTE, True, work, 0
+            elif operation == RESTITUTE:
+                operation = SWEEP
+            elif operation == ADD_WORK:
+                value = allowed_fraction(work, all_work(crowd, pairs, team), allowed)
+                operation = SCALE
+            elif operation == SCALE:
+                operation = last
+            else:
+                operation = DONE
+        if collided:
+            for n in range(crowd.order.shape[0]):
+                b = crowd.order[n]
+                if takes_batch(n, team) and pairs.busy[b] != 0:
+                    book_impacts(model, workspace, rows, crowd, pairs, b, refresh)
+            wait(team)
         return stamp, collided
 
     return collide

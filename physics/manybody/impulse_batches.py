@@ -29,6 +29,10 @@ from physics.model.lanes import update_previous
 from physics.model.workspace import FREE, MEETS
 from physics.step.event_steps import expect_impacts
 
+# what the solver does in a substep, in this order: it sweeps without the forces of the substep and
+# soft contacts, applies its first guess, and sweeps with both
+RIGID, GUESS, SOFT = range(3)
+
 
 @stage
 def batch_of(all_model, workspace, rows, crowd, pairs, b):
@@ -160,44 +164,27 @@ def make_prepare_batch(features):
 
 
 @cached_by_features
-def make_sweep_batch(features):
-    """Sequence of one sweep over the contacts of a batch."""
-    sweep = make_sweep(features)
+def make_solve_batch(features):
+    """Sequence of one operation of the solver on a batch: a sweep, or the first guess."""
+    sweep, warm_start = make_sweep(features), make_warm_start(features)
 
     @sequence
-    def sweep_batch(all_model, workspace, rows, crowd, pairs, b, h, soft):
+    def solve_batch(all_model, workspace, rows, crowd, pairs, b, h, operation):
         tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
         model, mine = bundle(tables), bundle(arrays)
         gather_speeds(crowd, pairs, b, workspace)
         gather_tensors(crowd, pairs, b, workspace)
         for k in range(mine.half_pair.shape[0]):
             if mine.half_pair[k].slots > 0:
-                moves = mine.search[0].moves
-                sweep(operands_of(model, mine, k), model.half_pair[k], h, soft, moves)
+                pair, moves = operands_of(model, mine, k), mine.search[0].moves
+                if operation == GUESS:
+                    warm_start(pair)
+                else:
+                    sweep(pair, model.half_pair[k], h, operation == SOFT, moves)
         scatter_speeds(crowd, pairs, b, workspace)
         return 0
 
-    return sweep_batch
-
-
-@cached_by_features
-def make_warm_batch(features):
-    """Sequence that applies the first guess of a batch."""
-    warm_start = make_warm_start(features)
-
-    @sequence
-    def warm_batch(all_model, workspace, rows, crowd, pairs, b):
-        tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
-        model, mine = bundle(tables), bundle(arrays)
-        gather_speeds(crowd, pairs, b, workspace)
-        gather_tensors(crowd, pairs, b, workspace)
-        for k in range(mine.half_pair.shape[0]):
-            if mine.half_pair[k].slots > 0:
-                warm_start(operands_of(model, mine, k))
-        scatter_speeds(crowd, pairs, b, workspace)
-        return 0
-
-    return warm_batch
+    return solve_batch
 
 
 @cached_by_features

@@ -26,11 +26,13 @@ from physics.manybody.impact_paths import (
 )
 from physics.manybody.impact_steps import make_collide, make_find
 from physics.manybody.impulse_batches import (
+    GUESS,
+    RIGID,
+    SOFT,
     make_finish_batch,
     make_list_contacts,
     make_prepare_batch,
-    make_sweep_batch,
-    make_warm_batch,
+    make_solve_batch,
 )
 from physics.manybody.spring_steps import REFRESH, RESUME, STEP
 from physics.manybody.tables import IMPACTS
@@ -66,8 +68,7 @@ def make_impulse_steps(features: Features):
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     list_contacts, prepare_batch = make_list_contacts(features), make_prepare_batch(features)
     find, collide = make_find(features), make_collide(features)
-    sweep = make_by_colour(features, make_sweep_batch(features))
-    warm_start = make_by_colour(features, make_warm_batch(features))
+    solve = make_by_colour(features, make_solve_batch(features))
     begin_joints, keep_joints = make_begin_joints(features), make_keep_joints(features)
     end_joints, joints = make_end_joints(features), features.joints
     finish_batch, end_step = make_finish_batch(features), make_end_step(features)
@@ -168,18 +169,18 @@ def make_impulse_steps(features: Features):
                 leave_impact(model, workspace, rows, crowd, pairs, h, began, collided, team)
                 phase = PATH
                 continue
-            for soft in range(2):
-                if soft == 1:
+            for operation in (RIGID, GUESS, SOFT):
+                if operation == GUESS:
                     for g in range(first, last):
                         for m in blocks_of(crowd, g):
                             change_velocities(crowd, m, span)
                     wait(team)
-                motor_time = span if soft == 1 else 0.0
-                begin_joints(model, workspace, crowd, soft == 0, soft == 1, motor_time, team)
-                if soft == 1:
-                    warm_start(model, workspace, rows, crowd, pairs, team, ())
-                sweep(model, workspace, rows, crowd, pairs, team, (span, soft == 1))
-                keep_joints(model, workspace, crowd, pairs, -1, motor_time, team)
+                clears, motor_time = operation == RIGID, 0.0 if operation == RIGID else span
+                if operation != SOFT:
+                    begin_joints(model, workspace, crowd, clears, not clears, motor_time, team)
+                solve(model, workspace, rows, crowd, pairs, team, (span, operation))
+                if operation != GUESS:
+                    keep_joints(model, workspace, crowd, pairs, -1, motor_time, team)
             end_joints(model, workspace, crowd, span, team)
             for n in range(batches):
                 b = crowd.order[n]
