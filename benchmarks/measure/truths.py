@@ -12,9 +12,9 @@ from importlib.util import find_spec
 
 from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.report.tables import Cell, Table
-from physics import PRESETS, Fidelity
-from physics.reference import loads
-from physics.reference.truths import ROWS, Engine
+from physics import PRESETS, Fidelity, Mesh, Particles
+from physics.reference import loads, meshes
+from physics.reference.truths import BALL, BALLS, OTHERS, RADIUS, Engine
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 
@@ -84,10 +84,26 @@ def measure() -> Iterator[Table]:
     """Right values, and those of each preset and of Newton's method; then what loads do."""
     levels: dict[str, Fidelity] = {**PRESETS, "newton": NEWTON}
     rows: list[list[Cell]] = [
+        [name, f"{right:.4g}", *(f"{value(level, BALL):.4f}" for level in levels.values())]
+        for name, right, value in BALLS
+    ]
+    rows += [
         [name, f"{right:.4g}", *(f"{value(level):.4f}" for level in levels.values())]
-        for name, right, value in ROWS
+        for name, right, value in OTHERS
     ]
     yield Table("truths", "Truths of theory", ["truth", "right", *levels], rows)
+    vertices, faces = meshes.ball(RADIUS, 128)
+    shapes = (Particles([[0.0, 0.0, 0.0]], RADIUS), Mesh(vertices=vertices, faces=faces))
+    rows = [
+        [
+            name,
+            f"{right:.4g}",
+            *("; ".join(f"{value(level, b):.4f}" for b in shapes) for level in levels.values()),
+        ]
+        for name, right, value in BALLS
+    ]
+    title = "Truths of balls: one of Particles; a mesh of 16,128 faces"
+    yield Table("balls", title, ["truth", "right", *levels], rows)
     rows = [
         [name, right, *(cell(level) for level in levels.values())] for name, right, cell in _loads()
     ]

@@ -14,7 +14,7 @@ from physics.collision.facing import FLOORS, facing
 from physics.collision.grid_distance import grid_distance
 from physics.collision.manifold import add_manifold_point
 from physics.collision.separations import make_separations, separation_bound
-from physics.collision.surface_kinds import by_surface_kind
+from physics.collision.surface_kinds import by_surface_kind, present_kinds
 from physics.compiler.jit import at, stage
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
@@ -81,6 +81,7 @@ def make_add_candidate(features):
 def make_list_samples(features):
     """Stage that fills the list of a half-pair in one lane."""
     impulse, particles = features.impulse, features.particles
+    manifolds = impulse and set(present_kinds(features)) != {PARTICLES}
     per_world_parameters, axial = features.per_world_parameters, features.axial
     add_candidate = make_add_candidate(features)
     grid = features.grid
@@ -176,7 +177,7 @@ def make_list_samples(features):
                     if face == 0.0:
                         face = entry_face(model, workspace, half_pair, i, relative)
                     row.memory[remembered_face, i] = face
-                if impulse:
+                if manifolds:
                     core = half_pair.core
                     ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                     _, nx, ny, nz = distance(

@@ -13,7 +13,7 @@ from physics.scene.compound import Compound
 from physics.scene.drives import Drive
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
-from physics.scene.shapes import PLANE, Shape
+from physics.scene.shapes import PLANE, Samples, Shape
 from physics.scene.solids import Body, Ground
 
 Array = np.ndarray
@@ -190,8 +190,13 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
     moving = np.where(np.arange(len(solids)) < layout.dynamic_count, widths, np.inf)
     reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
-    surface_reach = reach[:, b]
+    owner_reach, surface_reach = reach[:, a], reach[:, b]
     for k, half_pair in enumerate(half_pairs):
+        far = _particle_reach(half_pair.samples)
+        owner_reach[:, k] = np.maximum(owner_reach[:, k], far * size[:, half_pair.owner])
+        if half_pair.partners is not None:
+            far = _particle_reach(half_pair.partners)
+            surface_reach[:, k] = np.maximum(surface_reach[:, k], far * size[:, half_pair.other])
         if half_pair.part >= 0:  # about the part's own centre
             part = layout.parts[half_pair.part][1]
             surface_reach[:, k] = part.shape.reach * size[:, half_pair.other]
@@ -212,7 +217,7 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "core": cores * np.where(plane, 1.0, size[:, b])[:, :, None],
         "owner_radius": sampled * size[:, a],
         "radius": sampled * size[:, a] + rounded * size[:, b],
-        "owner_reach": reach[:, a],
+        "owner_reach": owner_reach,
         "surface_reach": surface_reach,
         "owner_size": size[:, a],
         "surface_size": size[:, b],
@@ -278,6 +283,11 @@ def _core_reach(shape: Shape, rounded: bool) -> float:
     if isinstance(shape, Compound) or not rounded:
         return shape.reach
     return shape.reach - shape.surface(0.0).radius
+
+
+def _particle_reach(samples: Samples) -> float:
+    """Largest distance in m from the centre of the samples' balls, which may leave the shape."""
+    return float(np.linalg.norm(samples.positions, axis=1).max(initial=0.0)) + samples.radius
 
 
 def compound_part_columns(layout: Layout, p: Parameters) -> Columns:

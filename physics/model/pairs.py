@@ -6,6 +6,7 @@ through one or two half-pairs: the samples of an owner against the surface of th
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ from physics.scene.torus import Torus
 
 Array = np.ndarray
 Solid = Body | Drive | Static | Ground
+
+# in sinks: how far the ball of a mesh may be from the mesh's centre of mass
+_OFF_CENTRE = 0.1
 
 
 class HalfPair(NamedTuple):
@@ -109,14 +113,20 @@ class Layout(NamedTuple):
         """
         statics = join_flush(scene.statics)
         solids: tuple[Solid, ...] = (*scene.bodies, *scene.driven_bodies, *statics)
+        touching = solids
+        if fidelity.geometry == "shape" and not no_half_pairs:
+            touching = tuple(_as_ball(s, scene, fidelity, own_spacing) for s in solids)
         parts = tuple((i, part) for i, solid in enumerate(solids) for part in _parts(solid))
         half_pairs = (
-            () if no_half_pairs else tuple(_half_pairs(scene, solids, fidelity, parts, own_spacing))
+            ()
+            if no_half_pairs
+            else tuple(_half_pairs(scene, touching, fidelity, parts, own_spacing))
         )
         modes = [(1.0, 1.0)] * len(solids)
         leverage = [0.0] * len(solids)
         rolls = np.zeros(len(solids), dtype=bool)
-        for i, body in enumerate(() if no_half_pairs else scene.bodies):
+        for i, body in enumerate(() if no_half_pairs else touching[: len(scene.bodies)]):
+            assert isinstance(body, Body)
             modes[i] = fastest_modes(body.shape, 0.5 * body.shape.width)  # for every fidelity
             leverage[i] = rocking_leverage(_single(body.shape))
             rolls[i] = leverage[i] == 0.0 or isinstance(body.shape, Cylinder | Torus)
@@ -164,6 +174,26 @@ def is_floor(solid: Solid, shape: Shape, fidelity: Fidelity) -> bool:
     if isinstance(solid, Static) and isinstance(solid.shape, Box):
         return sorted(solid.shape.half_extents)[1] >= 2.0 * shape.reach
     return isinstance(solid, Ground)
+
+
+def _as_ball(solid: Solid, scene: Scene, fidelity: Fidelity, own_spacing: bool) -> Solid:
+    """The solid itself; for a mesh that is a ball but for the sink, the same with that ball.
+
+    Its exact surface is smoother than a grid of distances, and faster.
+    """
+    if isinstance(solid, Ground) or not isinstance(solid.shape, Mesh):
+        return solid
+    width = solid.shape.width
+    apart = fidelity.spacing * width if own_spacing else spacing(solid.shape, scene, fidelity)
+    rounding = fidelity.rounding * width / 2.0
+    depth = sink(fidelity)
+    centres, _, radius, _ = solid.shape.samples(apart, rounding, depth)
+    central = len(centres) == 1 and np.abs(centres).max() < _OFF_CENTRE * depth
+    if not central:
+        return solid
+    if isinstance(solid, Body):  # its mass is known by now
+        return replace(solid, shape=Sphere(radius), density=None)
+    return replace(solid, shape=Sphere(radius))
 
 
 def _parts(solid: Solid) -> tuple[Part, ...]:

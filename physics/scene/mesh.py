@@ -1,5 +1,6 @@
 """Mesh: a solid that is given by the triangles of its surface."""
 
+import math
 import warnings
 from dataclasses import InitVar, dataclass, replace
 from functools import cached_property
@@ -240,7 +241,8 @@ class Mesh:
     def particles(self, spacing: float) -> Samples:
         """Points of a cubic lattice inside the mesh, found by depth peeling.
 
-        Their diameter is the spacing. Warns where walls are thinner than that.
+        Their diameter is the spacing, or less where it isn't a fraction of the longest side. Warns
+        where walls are thinner than that.
 
         Args:
             spacing: m; without meaning if the mesh has a `particle_count`.
@@ -249,12 +251,13 @@ class Mesh:
             ValueError: no point of the lattice is inside the mesh.
         """
         shell, corners = self.fill == "shell", (self._solid.vertices, self._solid.faces)
+        longest = float(np.ptp(self._solid.vertices, axis=0).max())
         if self.particle_count is None:
-            found = lattice(*corners, spacing / self.scale)
+            count = math.ceil(longest * self.scale / spacing)  # along it they fill the mesh exactly
+            found = lattice(*corners, longest / max(count, 1))
         else:
             found = budgeted(*corners, self._solid.volume, self.particle_count, shell)
-        apart = self.scale * found.spacing
-        longest = self.scale * float(np.ptp(self._solid.vertices, axis=0).max())
+        apart, longest = self.scale * found.spacing, self.scale * longest
         if not len(found.positions):
             raise ValueError(
                 f"Mesh has no particle: its walls, {self.thickness:.3g} m thick, are thinner than "

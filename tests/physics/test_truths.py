@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from physics import PRESETS, Box, Sphere
-from physics.reference import truths
+from physics import PRESETS, Box, Fidelity, Ground, Mesh, Particles, Scene, Sphere
+from physics.model.pairs import Layout
+from physics.reference import meshes, truths
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 BALL, CUBE = Sphere(truths.RADIUS), Box((truths.RADIUS,) * 3)
@@ -92,3 +93,31 @@ def test_a_rocking_block_keeps_its_angular_momentum_about_the_edge_that_it_hits(
     """First order in the step: at 2 ms the impact comes up to half a step early or late."""
     ratios = truths.rocking(level)
     assert ratios.mean() == pytest.approx(truths.ROCKING, rel=error)
+
+
+@pytest.mark.parametrize("level", ["solid", "fast", "accurate"])
+def test_a_ball_of_particles_is_a_ball(level, stress):
+    if level != "solid" and not stress:
+        pytest.skip("kernels of its own for twenty seconds; see make stress")
+    ball = Particles([[0.0, 0.0, 0.0]], truths.RADIUS)
+    for name, _, value in truths.BALLS if stress else truths.BALLS[5:6]:
+        assert value(level, ball) == pytest.approx(value(level, BALL), rel=1e-6), name
+
+
+@pytest.mark.parametrize("level", [*PRESETS.values(), NEWTON], ids=[*PRESETS, "newton"])
+def test_a_mesh_within_the_sink_of_a_ball_touches_as_that_ball(level: Fidelity, stress):
+    """A coarser one is a polyhedron, whose corners hop where a ball slides."""
+    vertices, faces = meshes.ball(truths.RADIUS, 128)
+    mesh = Mesh(vertices=vertices, faces=faces)
+    cube = truths.Body(Box((truths.RADIUS,) * 3), mass=truths.MASS, position=(0.1, 0.0, 0.0))
+    balls = [truths.Body(mesh, mass=truths.MASS, position=(x, 0.0, 0.0)) for x in (0.2, 0.3)]
+    pairs = Layout.of(Scene([cube, *balls], [Ground(height=-0.1)]), level).half_pairs
+    of_balls = [pair for pair in pairs if 0 not in (pair.owner, pair.other)]
+    assert len(of_balls) == 3  # with each other and with the ground
+    for pair in of_balls:
+        assert pair.samples.positions == pytest.approx(np.zeros((1, 3)))
+        assert pair.samples.radius == pytest.approx(truths.RADIUS, rel=1e-3)
+    assert all(pair.surface.mesh is None for pair in pairs)
+    if stress:
+        for name, _, value in truths.BALLS:
+            assert value(level, mesh) == pytest.approx(value(level, BALL), rel=2e-3), name

@@ -125,7 +125,7 @@ def test_walls_thinner_than_the_cells_of_the_grid_warn_with_the_number_of_cells(
 
 def test_walls_thinner_than_the_particles_warn_and_a_mesh_without_particles_is_an_error():
     thin = Mesh(vertices=meshes.bowl(0.05, 0.048)[0], faces=meshes.bowl(0.05, 0.048)[1])
-    with pytest.warns(UserWarning, match=r"thinner than the spacing of 0.008 m of particles"):
+    with pytest.warns(UserWarning, match=r"thinner than the spacing of 0.00769 m of particles"):
         thin.particles(0.008)
     hole = meshes.hollow_ball(0.05, 0.0499, 16)
     with pytest.raises(ValueError, match="has no particle: its walls"):

@@ -82,6 +82,28 @@ def test_particles_of_a_meshed_cube_carry_it_at_the_height_of_a_box():
     assert heights[1] == pytest.approx(heights[0], abs=1e-9)
 
 
+def test_particles_that_leave_the_corners_of_a_mesh_are_found_before_they_overlap():
+    """Balls of a lattice may reach farther than the mesh itself, here by 3 mm of 20 mm."""
+    shape = mesh_of(meshes.ball(0.02))
+    samples = shape.particles(0.02)
+    assert np.linalg.norm(samples.positions, axis=1).max() + samples.radius > 0.023
+    low = np.argmin(samples.positions @ (0.0, 0.6, 0.8))
+    way = samples.positions[low] / np.linalg.norm(samples.positions[low])
+    fidelity = Fidelity(law="impulse", geometry="particle", spacing=0.5)
+    bodies = [
+        Body(shape, mass=0.1, position=tuple(far * way), linear_velocity=tuple(-speed * way),
+             material=Material(restitution=0.5, friction=0.0))
+        for far, speed in ((0.0, 0.0), (0.048, 1.0))
+    ]  # fmt: skip
+    world = World(Scene(bodies, gravity=(0.0, 0.0, 0.0)), fidelity)
+    deepest = 0.0
+    for _ in range(10):
+        world.advance(fidelity.substep)
+        deepest = max(deepest, world.contacts().penetration.max(initial=0.0))
+    assert deepest < fidelity.substep
+    assert world.linear_velocity[0] @ way == pytest.approx((-0.75, -0.25), rel=1e-3)
+
+
 # --- resting, rolling and holding, all in one scene, which has one kernel ------------------------
 
 NAMES = ("bowl", "ball", "standing", "tipped", "large ball")
