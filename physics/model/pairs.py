@@ -30,8 +30,8 @@ from physics.scene.torus import Torus
 Array = np.ndarray
 Solid = Body | Drive | Static | Ground
 
-# in sinks: how far the ball of a mesh may be from the mesh's centre of mass
-_OFF_CENTRE = 0.1
+# relative to its radius: how far the ball of a mesh may be from the mesh's centre of mass
+_OFF_CENTRE = 1e-4
 
 
 class HalfPair(NamedTuple):
@@ -186,9 +186,8 @@ def _as_ball(solid: Solid, scene: Scene, fidelity: Fidelity, own_spacing: bool) 
     width = solid.shape.width
     apart = fidelity.spacing * width if own_spacing else spacing(solid.shape, scene, fidelity)
     rounding = fidelity.rounding * width / 2.0
-    depth = sink(fidelity)
-    centres, _, radius, _ = solid.shape.samples(apart, rounding, depth)
-    central = len(centres) == 1 and np.abs(centres).max() < _OFF_CENTRE * depth
+    centres, _, radius, _ = solid.shape.samples(apart, rounding, sink(fidelity))
+    central = len(centres) == 1 and np.abs(centres).max() < _OFF_CENTRE * radius
     if not central:
         return solid
     if isinstance(solid, Body):  # its mass is known by now

@@ -249,6 +249,7 @@ def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:
     gravity = float(np.linalg.norm(scene.gravity))
     yield "pair                             N/m   rad per step  sink at rest      e   friction"
     listed: dict[tuple[str, ...], str] = {}
+    slowest, pressed = math.inf, ""
     for row in model.half_pair:
         i, j = int(row["owner"]), int(row["surface"])
         # the load of what rests on it: the lighter of two bodies, or the body on a static
@@ -262,10 +263,20 @@ def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:
             f"{row['restitution']:5.3g}   {row['friction']:8.3g}"
         )
         listed.setdefault(tuple(sorted(kinds)), line)
+        # springs alone turn a speed into a depth of speed * substep / phase
+        widths = [s.shape.width for s in (solids[i], solids[j]) if not isinstance(s, Ground)]
+        speed = 0.5 * min(widths) * phase / fidelity.substep
+        if speed < slowest:
+            slowest, pressed = speed, pair
     yield from list(listed.values())[:_PAIRS]
     if len(listed) > _PAIRS:
         yield f"and {len(listed) - _PAIRS} more"
     yield "a body sinks by its own weight; below others, by theirs too"
+    if fidelity.law == "spring":
+        yield (
+            f"an impact at {slowest:.3g} m/s ({pressed}) presses half of the narrower one in, a "
+            "faster one more: impulses don't"
+        )
 
 
 def _kind(solid: Any) -> str:

@@ -87,6 +87,14 @@ def test_an_impact_in_the_first_step_has_its_restitution(shape, level, error):
 
 
 @pytest.mark.parametrize(
+    ("level", "error"), [("fast", 0.03), ("balanced", 0.03), ("accurate", 1e-3), ("solid", 1e-9)]
+)
+def test_a_ball_that_falls_from_ten_metres_keeps_its_energy_in_ten_bounces(level, error):
+    energies = truths.bounced_energy(level)
+    assert energies == pytest.approx(np.ones(len(energies)), abs=error)
+
+
+@pytest.mark.parametrize(
     ("level", "error"), [(replace(PRESETS["solid"], substep=5e-4), 0.01), (NEWTON, 0.03)]
 )
 def test_a_rocking_block_keeps_its_angular_momentum_about_the_edge_that_it_hits(level, error):
