@@ -102,7 +102,7 @@ def test_costs_add_up_to_the_whole():
 
 def test_many_bodies_are_listed_by_kind():
     text = Fidelity().explain(tower(100), costs=False)
-    assert len(section(text, "Contacts").splitlines()) == 4
+    assert len(section(text, "Contacts").splitlines()) == 5  # two pairs
 
 
 def test_a_refused_step_is_not_called_stable():
