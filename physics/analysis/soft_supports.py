@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from physics.analysis.sinks import rest_depth
 from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import given_stiffness
 from physics.model.tables import Model
@@ -31,13 +32,13 @@ class SoftSupport(UserWarning):
 
 def warn_of_soft_supports(scene: Scene, fidelity: Fidelity, model: Model) -> None:
     """Warns of the contact that is deepest for its width, and says what would be right."""
-    gravity, bodies = math.hypot(*scene.gravity), scene.bodies
-    if gravity == 0.0 or not bodies:
+    bodies = scene.bodies
+    if not any(scene.gravity) or not bodies:
         return
     loads, above = _loads(scene)
     solids = (*bodies, *scene.driven_bodies, *scene.statics)
     worst, found = DEEP, (0, 0, 0.0)
-    for row in model.half_pair:
+    for n, row in enumerate(model.half_pair):
         upper, lower = int(row["owner"]), int(row["surface"])
         if upper < len(bodies) and lower < len(bodies) and above[upper, lower]:
             upper, lower = lower, upper
@@ -46,7 +47,7 @@ def warn_of_soft_supports(scene: Scene, fidelity: Fidelity, model: Model) -> Non
         )
         if upper >= len(bodies) or not carried:
             continue
-        depth = gravity * loads[upper] / float(row["stiffness"])
+        depth = rest_depth(scene, model, n, float(loads[upper]))
         carrier = solids[lower]
         width = bodies[upper].shape.width
         if not isinstance(carrier, Ground):

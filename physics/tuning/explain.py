@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from physics.analysis.field_limits import longest_step
+from physics.analysis.sinks import rest_depth
 from physics.analysis.soft_supports import SoftSupport
 from physics.analysis.step_limits import largest_safe_step
 from physics.manybody.limits import neighbourhoods
@@ -246,15 +247,14 @@ def _refusal(scene: Scene, fidelity: Fidelity) -> str:
 def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:
     """Per kind of pair: stiffness, phase per step, sink at rest, restitution, friction."""
     solids = (*scene.bodies, *scene.driven_bodies, *scene.statics)
-    gravity = float(np.linalg.norm(scene.gravity))
     yield "pair                             N/m   rad per step  sink at rest      e   friction"
     listed: dict[tuple[str, ...], str] = {}
     slowest, pressed = math.inf, ""
-    for row in model.half_pair:
+    for n, row in enumerate(model.half_pair):
         i, j = int(row["owner"]), int(row["surface"])
         # the load of what rests on it: the lighter of two bodies, or the body on a static
         masses = [float(s.mass or 0.0) for s in (solids[i], solids[j]) if isinstance(s, Body)]
-        sink = gravity * min(masses) / float(row["stiffness"]) if masses else 0.0
+        sink = rest_depth(scene, model, n, min(masses)) if masses else 0.0
         phase = fidelity.substep * math.sqrt(float(row["stiffness"] / row["pair_mass"]))
         kinds = _kind(solids[i]), _kind(solids[j])
         pair = " on ".join(kinds)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from physics import PRESETS, Body, Ground, Material, Mesh, Scene, World
+from physics.analysis.sinks import depth_on_plane
 from physics.model.pairs import Layout
 from physics.reference import meshes
 from physics.rotation import rotate_back, rotation_matrix
@@ -146,6 +147,35 @@ def test_round_meshes_rest_within_a_fiftieth_of_their_size_of_their_hull(name, p
     low = world.position[:, 0, 2] + [lowest(mesh, turn) for turn in turns]
     assert np.min(low) > -(sink(preset) + 0.02 * 2.0 * mesh.reach)
     assert np.max(low) < 1e-3 * mesh.width
+
+
+@pytest.mark.parametrize("preset", PRESET_NAMES)
+@pytest.mark.parametrize("name", ["knight", "ball"])
+def test_a_round_mesh_sinks_as_far_as_its_samples_say(name, preset, stress):
+    """A knight of 60 mm that lies at fast sinks by 7.5 mm, on a part of its weight's stiffness."""
+    if name == "ball" and preset == "solid" and not stress:
+        pytest.skip("make stress")
+    mesh = mesh_of(meshes.knight() if name == "knight" else meshes.ball(0.1, 48))
+    world = dropped(mesh, preset, 2e-3, 6)
+    world.advance(3.0)
+    samples, orientation = resting_samples(mesh, preset), world.orientation[:, 0]
+    for place, turn in zip(world.position[:, 0], orientation, strict=True):
+        heights = samples.positions @ rotation_matrix(turn).T[:, 2]
+        deep = depth_on_plane(heights - heights.min(), samples.weights, sink(preset))
+        assert samples.radius - (place[2] + heights.min()) == pytest.approx(deep, rel=0.03)
+
+
+def test_a_world_warns_of_a_mesh_that_lies_too_softly():
+    knight = mesh_of(meshes.knight())
+    fallen = dropped(knight, "fast", 2e-3, 1)
+    fallen.advance(3.0)
+    stands = knight.placed((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))[1]
+    for turn, deep in ((stands, False), (tuple(fallen.orientation[0, 0]), True)):
+        body = Body(knight, density=DENSITY, orientation=turn)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            World(Scene([body], [Ground()]), "fast")
+        assert any("presses on static 0" in str(w.message) for w in caught) is deep
 
 
 def test_no_sample_stands_over_the_hull_of_a_convex_mesh():
