@@ -37,9 +37,8 @@ def bounce(e: float) -> Trial:
     )  # fmt: skip
 
 
-def oblique(name: str, title: str, friction: float, along: float) -> Trial:
-    """A ball hits the ground obliquely, with e = 0.5 and without gravity."""
-    e = 0.5
+def oblique(name: str, title: str, friction: float, along: float, e: float = 0.5) -> Trial:
+    """A ball hits the ground obliquely, without gravity."""
     exact = oblique_impact(along, SPEED, friction, e, RADIUS)
 
     def begin(worlds: Worlds) -> None:
