@@ -14,7 +14,8 @@ from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Fidelity, Mesh, Particles
 from physics.reference import loads, meshes
-from physics.reference.truths import BALL, BALLS, OTHERS, RADIUS, Engine
+from physics.reference.blocks import BLOCKS
+from physics.reference.truths import BALL, BALLS, RADIUS, Engine
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 
@@ -89,7 +90,7 @@ def measure() -> Iterator[Table]:
     ]
     rows += [
         [name, f"{right:.4g}", *(f"{value(level):.4f}" for level in levels.values())]
-        for name, right, value in OTHERS
+        for name, right, value in BLOCKS
     ]
     yield Table("truths", "Truths of theory", ["truth", "right", *levels], rows)
     vertices, faces = meshes.ball(RADIUS, 128)

@@ -11,9 +11,10 @@ from benchmarks.trade.impacts import oblique
 from benchmarks.trade.starts import tiled
 from benchmarks.trade.trial import Trace, Trial, Worlds
 from physics import Body, Box, Ground, Material, Scene, Sphere, Static
+from physics.reference.blocks import BLOCK, ROCKING
 from physics.reference.closed_forms import incline_acceleration
 from physics.reference.scenes import CUBE, GRAVITY, block_on_ground
-from physics.reference.truths import BLOCK, DOME, RADIUS, ROCKING
+from physics.reference.truths import DOME, RADIUS
 
 WIDTH = 2.0 * CUBE.half_extents[2]  # m
 START = 0.05  # rad from the top of the dome

@@ -11,6 +11,9 @@ from physics.rotation import rotation_matrix
 
 Array = np.ndarray
 
+# eigenvalue at which a mode that flips becomes unstable
+_FLIP = 2.0
+
 
 def unit_stiffness(
     model: Model, features: Features, state: State, world: int
@@ -19,8 +22,9 @@ def unit_stiffness(
 
     Returns:
         For each half-pair in contact three matrices [6 m, 6 m]: along the normals, across them, and
-        against relative rotation. Coordinates are the displacement and the rotation vector of each
-        dynamic body, in the world frame. And what `mass_parts` gives.
+        against relative rotation, the last two less as `grips` says. Coordinates are the
+        displacement and the rotation vector of each dynamic body, in the world frame. And what
+        `mass_parts` gives.
     """
     touching = report(model, features, state, world)
     model = model.of_world(world)
@@ -29,9 +33,12 @@ def unit_stiffness(
     rows = model.half_pair[touching.half_pair]
     ends = np.stack([rows["owner"], rows["surface"]], axis=-1)
     parts = mass_parts(ends, touching.normal, touching.weight, model.dynamic["inverse_mass"])
-    for k, point, normal, weight, part in zip(
-        touching.half_pair, touching.point, touching.normal, touching.weight, parts, strict=True
-    ):
+    loads = np.stack([rows["owner_grip"], rows["surface_grip"]], axis=-1)
+    grip = grips(ends, touching.weight, loads, dynamic_count)
+    for k, point, normal, weight, part, held in zip(
+        touching.half_pair, touching.point, touching.normal, touching.weight, parts, grip,
+        strict=True,
+    ):  # fmt: skip
         constants = model.half_pair[k]
         jacobian, rotation = np.zeros((2, 3, 6 * dynamic_count))
         for solid, sign in ((constants["owner"], 1.0), (constants["surface"], -1.0)):
@@ -41,9 +48,9 @@ def unit_stiffness(
                 jacobian[:, columns] = sign * point_jacobian(arm)
                 rotation[:, 6 * solid + 3 : 6 * solid + 6] = sign * np.eye(3)
         along = jacobian.T @ np.outer(normal, normal) @ jacobian
-        across = jacobian.T @ jacobian - along
+        across = held * (jacobian.T @ jacobian - along)
         along_k, across_k, turn_k, _ = found.get(int(k), (0.0, 0.0, 0.0, 1.0))
-        turn = turn_k + weight * rotation.T @ rotation
+        turn = turn_k + held * weight * rotation.T @ rotation
         found[int(k)] = (along_k + weight * along, across_k + weight * across, turn, float(part))
     return found
 
@@ -80,6 +87,24 @@ def mass_parts(ends: Array, normal: Array, weight: Array, inverse_mass: Array) -
     inverse = inverse_mass[index]
     split = np.sum(np.maximum(along, 1.0) * inverse, axis=1) / np.sum(inverse, axis=1)
     return split[pair]
+
+
+def grips(ends: Array, weight: Array, loads: Array, bodies: int) -> Array:
+    """By how much `spring.mass_splitting` reduces the damping of friction at each contact.
+
+    Args:
+        ends: [n, 2] owner and surface of each contact; beyond the bodies they don't move.
+        weight: [n].
+        loads: [n, 2] `owner_grip` and `surface_grip`.
+        bodies: number of bodies.
+
+    Returns:
+        [n] factors; of a body that touches others with a part of a face only, too large.
+    """
+    index, sums = np.minimum(ends, bodies), np.zeros(bodies + 1)
+    np.add.at(sums, index, weight[:, None] * loads)
+    sums[bodies] = 0.0
+    return np.asarray((_FLIP / np.maximum(sums, _FLIP))[index].min(axis=1, initial=1.0))
 
 
 def inverse_masses(model: Model, state: State, world: int) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from physics.analysis import stability
-from physics.analysis.contact_stiffness import mass_parts
+from physics.analysis.contact_stiffness import grips, mass_parts
 from physics.rotation import rotation_matrix
 
 Array = np.ndarray
@@ -63,6 +63,8 @@ class ContactSystem:
         inertia = np.where(np.isfinite(constants["inertia"]), constants["inertia"], 0.0)
         self._inertia = np.einsum("bij,bj,bkj->bik", turn, inertia, turn)  # a drive never rotates
         self._constants = constants
+        loads = np.array([[row["owner_grip"], row["surface_grip"]] for row in rows])
+        self._grips = grips(ends, weight, loads.reshape(-1, 2)[kind], self._count)
         self._parts = np.ones(len(kind))
         if not dashpot:
             self._parts = mass_parts(ends, normal, weight, constants["inverse_mass"])
@@ -104,7 +106,7 @@ class ContactSystem:
             along[own] = stability.normal_load(row, dashpot, h, self._parts[own])
         across = np.array([stability.shear_load(row, viscous, h) for row in self._rows])
         twist = np.array([stability.twist_load(row, h) for row in self._rows])
-        return along, across[self._kind], twist[self._kind]
+        return along, self._grips * across[self._kind], self._grips * twist[self._kind]
 
     def _accelerate(self, loads: tuple[Array, Array, Array], servo: Array, x: Array) -> Array:
         """M^-1 A x, see `analysis.stability`."""

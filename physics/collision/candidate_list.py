@@ -212,7 +212,7 @@ def make_list_samples(features):
 @cached_by_features
 def make_search(features):
     """Stage that replaces the list of a half-pair in one lane."""
-    memory_size = contact_memory(features).size
+    memory_size, impulse = contact_memory(features).size, features.impulse
     clear, list_samples = make_clear(features), make_list_samples(features)
 
     @stage
@@ -230,9 +230,13 @@ def make_search(features):
         if half_pair.partner_count == 0:
             separation = max(separation, separation_bound(half_pair, i, relative))
         reach = at(half_pair.skin, i)
-        if half_pair.partner_count == 0:
-            # samples that touch by the middle of the next drift have a force in this step, or
-            # collide before they overlap; more than `find_impacts` accepts, by more than round-off
+        one, two = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
+        spins = one.rotation_bound[i] + two.rotation_bound[i]
+        # samples that touch by the middle of the next drift have a force in this step, or collide
+        # before they overlap; more than `find_impacts` accepts, by more than round-off. Not of
+        # springs on bodies that turn by more than a radian: their samples move on no straight line
+        straight = impulse | (spins <= at(half_pair.owner_reach, i))
+        if straight & (half_pair.partner_count == 0):
             reach = max(reach, 0.5 * relative_motion + 2.0 * TOUCH_TOLERANCE)
         count = 0
         remaining_skin = separation

@@ -17,6 +17,7 @@ from physics.granular.tables import (
     MOST_OF,
     MOTION,
     ROTATION,
+    SHEAR_LOAD,
     SLABS,
     SPIN,
     TURN,
@@ -97,8 +98,13 @@ def store_states(heap, states, group, row):
 
 @stage
 def sum_forces(heap, scratch, group, solid):
-    """Adds the forces of all slabs' pairs on a lane group, in the order of the slabs."""
+    """Adds the forces of all slabs' pairs on a lane group, in the order of the slabs.
+
+    And the shear loads, in `SOLID.grip`.
+    """
     place = group * LANES
+    for i in range(LANES):
+        solid.grip[i] = 0.0
     for s in range(SLABS):
         low, high = heap.force_range[s, 0], heap.force_range[s, 1]
         if low < place + LANES and high > place:
@@ -108,6 +114,7 @@ def sum_forces(heap, scratch, group, solid):
                 for c in range(3):
                     solid.force[c, i] += scratch.force[b, c]
                     solid.torque[c, i] += scratch.force[b, 3 + c]
+                solid.grip[i] += scratch.force[b, 6]
 
 
 @stage
@@ -236,6 +243,7 @@ def make_body_pass(features):
     kinematics, static_forces = make_kinematics(features), make_static_forces(features)
     write_particles = make_write_particles(features)
     equal, euler = features.equal, features.integrator == EULER
+    friction = features.friction
     before = 1.0 if euler else 0.5
 
     @stage
@@ -266,6 +274,9 @@ def make_body_pass(features):
                     heap, constants, slab, next_entry, group * LANES, LANES, solid,
                     0.0 if refresh else h, evaluation,
                 )  # fmt: skip
+                if friction and not refresh:
+                    for i in range(LANES):
+                        heap.motion[group * LANES + i, SHEAR_LOAD] = solid.grip[i]
                 if not euler and what & KICK:
                     kick(model, workspace, 0.5 * h)
                 copy_rows(row.force, solid.force, 3)

@@ -1,7 +1,12 @@
 """Coefficients of a contact, from those of the two classes of bodies and from their masses."""
 
+import math
+
 from physics.compiler.jit import stage
 from physics.model.tangential import tangential_coefficients
+
+# eigenvalue of a step at which a mode only changes its sign
+_FLIP = 2.0
 
 
 @stage
@@ -34,3 +39,27 @@ def contact_coefficients(
     )
     shear, damping = tangential_coefficients(k, mass, shear_mass, leverage, shear_ratio, step)
     return k, inverse_mass, shear, damping
+
+
+@stage
+def shear_loads(stiffness, damping, first, second, weight, step):
+    """What a contact adds to the largest eigenvalues of a step's friction on its two bodies.
+
+    See `spring.mass_splitting`.
+
+    Args:
+        stiffness: N/m, of the shear spring.
+        damping: N s/m, before it is reduced.
+        first: 1/kg, inverse shear mass of the owner.
+        second: likewise of the surface; 0 of a static.
+        weight: of the particle.
+        step: s.
+    """
+    load, coupling = weight * step * (damping + 0.5 * step * stiffness), math.sqrt(first * second)
+    return load * (first + coupling), load * (second + coupling)
+
+
+@stage
+def grip_of(load, other):
+    """Factor on the damping of friction with which no body's eigenvalue exceeds that of a flip."""
+    return min(_FLIP / max(load, _FLIP), _FLIP / max(other, _FLIP))

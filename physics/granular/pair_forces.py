@@ -10,13 +10,14 @@ import numpy as np
 
 from physics.collision.distances import sphere_distance
 from physics.compiler.jit import stage
-from physics.granular.coefficients import contact_coefficients
+from physics.granular.coefficients import contact_coefficients, grip_of, shear_loads
 from physics.granular.tables import (
     CENTER,
     CLASS,
     INVERSE_MASS,
     MOTION,
     PARITY,
+    SHEAR_LOAD,
     SPIN,
     TURN,
     VELOCITY,
@@ -37,7 +38,8 @@ _BETWEEN, _ARM, _OTHER_ARM, _RELATIVE, _SPIN, _OTHER_SPIN, _SHEAR, _TURN = range
 _RADIUS, _OTHER_RADIUS, _INVERSE, _OTHER_INVERSE, _WEIGHT, _CONTACT = range(25, 31)
 # out: force and torque on the owner, torque on the surface; what a report needs
 _FORCE, _TORQUE, _OTHER_TORQUE, NORMAL, POINT_ARM, PENETRATION = range(38, 54, 3)
-ROWS = PENETRATION + 1
+# in: factor on the damping of friction; out: what the contact adds to `SHEAR_LOAD` of both bodies
+_GRIP, _LOAD, _OTHER_LOAD, ROWS = range(PENETRATION + 1, PENETRATION + 5)
 FORCE = _FORCE
 
 
@@ -47,7 +49,8 @@ _1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
 _CENTER, _VELOCITY, _SPIN_COLUMN = np.uint64(CENTER), np.uint64(VELOCITY), np.uint64(SPIN)
 _TURN_COLUMN, _INVERSE_COLUMN = np.uint64(TURN), np.uint64(INVERSE_MASS)
 _CLASS_COLUMN, _WEIGHT_COLUMN = np.uint64(CLASS), np.uint64(WEIGHT)
-_EIGHT, _4, _5 = np.uint64(8), np.uint64(4), np.uint64(5)
+_LOAD_COLUMN = np.uint64(SHEAR_LOAD)
+_EIGHT, _4, _5, _6 = np.uint64(8), np.uint64(4), np.uint64(5), np.uint64(6)
 
 
 @stage
@@ -88,7 +91,7 @@ def make_pack(features):
 
     `particle`, `motion` and `pair` are flat.
     """
-    history, equal = features.history, features.equal
+    history, equal, friction = features.history, features.equal, features.friction
 
     @stage
     def pack(
@@ -113,6 +116,10 @@ def make_pack(features):
             put_three(block, _SPIN, n, ax, ay, az)
             bx, by, bz = three(motion, b + _SPIN_COLUMN)
             put_three(block, _OTHER_SPIN, n, bx, by, bz)
+            if friction:
+                block[_GRIP * BLOCK + n] = grip_of(
+                    motion[a + _LOAD_COLUMN], motion[b + _LOAD_COLUMN]
+                )
             if history:
                 k4 = k * _FOUR
                 lasts = shear[k4 + _3] == evaluation
@@ -183,7 +190,7 @@ def make_law(features):
 @cached_by_features
 def make_compute(features):
     """Stage that computes the contacts of a block."""
-    history, equal = features.history, features.equal
+    history, equal, friction = features.history, features.equal, features.friction
     law = make_law(features)
 
     @stage
@@ -197,6 +204,10 @@ def make_compute(features):
             row.unit_stiffness, row.stiffness, row.shear_ratio, row.leverage,
             row.first_compliance, row.second_compliance, inverse, inverse, step,
         )  # fmt: skip
+        first, second = row.first_compliance, row.second_compliance
+        load, other_load = shear_loads(
+            shear_k, shear_c, first * inverse, second * inverse, weight, step
+        )
         for n in range(count):
             if not equal:
                 radius, other_radius = block[_RADIUS * BLOCK + n], block[_OTHER_RADIUS * BLOCK + n]
@@ -214,6 +225,14 @@ def make_compute(features):
                     block[(_CONTACT + 7) * BLOCK + n],
                     inverse,
                     other_inverse,
+                    step,
+                )
+                load, other_load = shear_loads(
+                    shear_k,
+                    shear_c,
+                    block[(_CONTACT + 6) * BLOCK + n] * inverse,
+                    block[(_CONTACT + 7) * BLOCK + n] * other_inverse,
+                    weight,
                     step,
                 )
             distance, nx, ny, nz = sphere_distance(
@@ -264,8 +283,13 @@ def make_compute(features):
                 sx = r00 * tx + r01 * ty + r02 * tz
                 sy = r10 * tx + r11 * ty + r12 * tz
                 sz = r20 * tx + r21 * ty + r22 * tz
+            reduced = shear_c
+            if friction:
+                reduced = block[_GRIP * BLOCK + n] * shear_c
+                block[_LOAD * BLOCK + n] = load
+                block[_OTHER_LOAD * BLOCK + n] = other_load
             fx, fy, fz, sx, sy, sz = law(
-                penetration, nx, ny, nz, ux, uy, uz, k, damping, inverse_mass, shear_k, shear_c,
+                penetration, nx, ny, nz, ux, uy, uz, k, damping, inverse_mass, shear_k, reduced,
                 mu, h, sx, sy, sz,
             )  # fmt: skip
             if history:
@@ -296,10 +320,10 @@ def make_compute(features):
 
 
 @stage
-def unpack(body_of, pair, touching, block, force, shift, first, count):
+def unpack(body_of, pair, touching, block, force, shift, first, count, friction):
     """Adds forces and torques of a block to the rows of the bodies, `shift` before their place.
 
-    `pair` and `force` are flat.
+    And the shear loads. `pair` and `force` are flat.
     """
     before = np.uint64(shift)
     for n in range(count):
@@ -321,6 +345,9 @@ def unpack(body_of, pair, touching, block, force, shift, first, count):
         force[b + _3] -= block[_OTHER_TORQUE * BLOCK + n]
         force[b + _4] -= block[(_OTHER_TORQUE + 1) * BLOCK + n]
         force[b + _5] -= block[(_OTHER_TORQUE + 2) * BLOCK + n]
+        if friction:
+            force[a + _6] += block[_LOAD * BLOCK + n]
+            force[b + _6] += block[_OTHER_LOAD * BLOCK + n]
 
 
 @stage
@@ -340,7 +367,7 @@ def make_pair_forces(features):
 
     `h`: s; 0 in a refresh, which changes no spring.
     """
-    history = features.history
+    history, friction = features.history, features.friction
     pack, compute = make_pack(features), make_compute(features)
 
     @stage
@@ -368,7 +395,7 @@ def make_pair_forces(features):
                 here, evaluation,
             )  # fmt: skip
             compute(constants, sample, block, here, h)
-            unpack(heap.body_of, pair, touching, block, force, low, first, here)
+            unpack(heap.body_of, pair, touching, block, force, low, first, here, friction)
             if history and h > 0.0:
                 keep_springs(shear, touching, block, first, here, evaluation + 1)
 

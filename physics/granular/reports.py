@@ -115,7 +115,7 @@ def make_report_statics(features: HeapFeatures) -> Any:
                         shear = heap.wall_shear[current, slab * room + entry_of]
                         if shear[3] == evaluation:
                             sx, sy, sz = shear[0], shear[1], shear[2]
-                    depth, nx, ny, nz, ax, ay, az, fx, fy, fz, _, _, _ = static_force(
+                    depth, nx, ny, nz, ax, ay, az, fx, fy, fz, _, _, _, _ = static_force(
                         heap, constants, n, s, 0.0, sx, sy, sz
                     )
                     if depth > 0.0:

@@ -7,7 +7,7 @@ import numpy as np
 
 from physics.granular.advance import make_advance
 from physics.granular.classes import bodies_of, constants_of
-from physics.granular.coefficients import contact_coefficients
+from physics.granular.coefficients import contact_coefficients, shear_loads
 from physics.granular.packing import (
     allocate,
     forget,
@@ -290,7 +290,8 @@ class GranularSimulation(Simulation):
         """Coefficients of the contacts of a body with another solid, in scene order.
 
         Stiffness and shear_stiffness in N/m, damping (a ratio), shear_damping in N s/m,
-        inverse_mass of the pair in 1/kg, friction, and weight of each particle.
+        inverse_mass of the pair in 1/kg, friction, weight of each particle, and what `shear_loads`
+        says of both bodies.
         """
         own, constants = self._bodies, self._constants
         body = own.class_of[first]
@@ -304,7 +305,12 @@ class GranularSimulation(Simulation):
             row["first_compliance"], row["second_compliance"],
             own.dynamic["inverse_mass"][first], other, constants.step,
         )  # fmt: skip
+        of_owner = row["first_compliance"] * own.dynamic["inverse_mass"][first]
+        of_other = row["second_compliance"] * other
+        grip = shear_loads(shear, damping, of_owner, of_other, 1.0, constants.step)
         return {
+            "owner_grip": grip[0],
+            "surface_grip": grip[1],
             "stiffness": k,
             "shear_stiffness": shear,
             "damping": float(row["damping"]),

@@ -8,7 +8,7 @@ from typing import Any
 
 from physics.collision.distances import core_distance
 from physics.compiler.jit import LANES, stage
-from physics.granular.coefficients import contact_coefficients
+from physics.granular.coefficients import contact_coefficients, grip_of, shear_loads
 from physics.granular.neighbors import find_old, keep_shear
 from physics.granular.pair_forces import make_law
 from physics.granular.tables import (
@@ -16,6 +16,7 @@ from physics.granular.tables import (
     CLASS,
     INVERSE_MASS,
     PARITY,
+    SHEAR_LOAD,
     SKIN,
     SLABS,
     SPIN,
@@ -148,7 +149,10 @@ def make_static_force(features):
 
     @stage
     def static_force(heap, constants, n, s, h, sx, sy, sz):
-        """Penetration; normal, arm, force on the body and spring to remember, x y z each."""
+        """Penetration; normal, arm, force on the body and spring to remember, x y z each.
+
+        And what it adds to `SHEAR_LOAD`.
+        """
         body, particle, motion = heap.body_of[n], heap.particle, heap.motion
         x, y, z, radius = particle[n, 0], particle[n, 1], particle[n, 2], particle[n, 3]
         d, nx, ny, nz = static_distance(constants.static[s], x, y, z, radius)
@@ -164,16 +168,19 @@ def make_static_force(features):
             row.unit_stiffness, row.stiffness, row.shear_ratio, row.leverage, row.first_compliance,
             0.0, motion[body, INVERSE_MASS], 0.0, constants.step,
         )  # fmt: skip
+        weight, load = motion[body, WEIGHT], motion[body, SHEAR_LOAD]
+        compliance = row.first_compliance * motion[body, INVERSE_MASS]
+        adds, _ = shear_loads(shear_k, shear_c, compliance, 0.0, weight, constants.step)
+        shear_c *= grip_of(load, 0.0)
         fx, fy, fz, sx, sy, sz = law(
             radius - d, nx, ny, nz,
             motion[body, VELOCITY] + px, motion[body, VELOCITY + 1] + py,
             motion[body, VELOCITY + 2] + pz,
             k, row.damping, inverse_mass, shear_k, shear_c, row.friction, h, sx, sy, sz,
         )  # fmt: skip
-        weight = motion[body, WEIGHT]
         return (
             radius - d, nx, ny, nz, ax, ay, az,
-            weight * fx, weight * fy, weight * fz, sx, sy, sz,
+            weight * fx, weight * fy, weight * fz, sx, sy, sz, adds,
         )  # fmt: skip
 
     return static_force
@@ -213,7 +220,7 @@ def make_static_forces(features):
                     shear = heap.wall_shear[current, k]
                     if shear[3] == evaluation:
                         sx, sy, sz = shear[0], shear[1], shear[2]
-                _, _, _, _, ax, ay, az, fx, fy, fz, sx, sy, sz = static_force(
+                _, _, _, _, ax, ay, az, fx, fy, fz, sx, sy, sz, adds = static_force(
                     heap, constants, n, s, h, sx, sy, sz
                 )
                 tx, ty, tz = cross(ax, ay, az, fx, fy, fz)
@@ -223,6 +230,7 @@ def make_static_forces(features):
                 solid.torque[0, lane] += tx
                 solid.torque[1, lane] += ty
                 solid.torque[2, lane] += tz
+                solid.grip[lane] += adds
                 if history and h > 0.0:
                     shear[0], shear[1], shear[2] = sx, sy, sz
                     shear[3] = evaluation + 1

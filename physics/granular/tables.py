@@ -36,9 +36,9 @@ BODY = np.dtype(
 
 # columns of Heap.motion: what a contact reads of a body
 CENTER, VELOCITY, SPIN, TURN = 0, 3, 6, 9  # m, m/s, rad/s, quaternion x y z w
-INVERSE_MASS, CLASS, WEIGHT, MOTION = range(
-    13, 17
-)  # 1/kg; row and column of Model.contact; of its particles
+# 1/kg; row and column of Model.contact; of its particles; and the largest eigenvalue of a step's
+# friction on it in the last step, see spring/mass_splitting.py
+INVERSE_MASS, CLASS, WEIGHT, SHEAR_LOAD, MOTION = range(13, 18)
 
 # one row per pair of classes of bodies, or class of body and static. Classes have the same material
 # and shape, up to size. The kernel derives stiffness and friction from it and from the two masses

@@ -67,9 +67,10 @@ def make_set_responses(features):
                 sx, sy, sz, px, py, pz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 if friction:
                     anchor, tangential = point.anchor, point.tangential_impulse
-                    sx = ux - un * nx + ANCHOR_RATE * anchor[0, i]
-                    sy = uy - un * ny + ANCHOR_RATE * anchor[1, i]
-                    sz = uz - un * nz + ANCHOR_RATE * anchor[2, i]
+                    arms = point.slip_bend
+                    sx = ux - un * nx + arms[0, i] + ANCHOR_RATE * anchor[0, i]
+                    sy = uy - un * ny + arms[1, i] + ANCHOR_RATE * anchor[1, i]
+                    sz = uz - un * nz + arms[2, i] + ANCHOR_RATE * anchor[2, i]
                     px, py, pz = tangential[0, i], tangential[1, i], tangential[2, i]
                 row.slip[0, i] = sx
                 row.slip[1, i] = sy

@@ -38,11 +38,15 @@ from physics.collision.grid_distance import grid_distances
 from physics.collision.relative_frame import relative_pose
 from physics.collision.surface_kinds import by_surface_kind, present_kinds
 from physics.compiler.jit import LANES, at, stage
+from physics.impulse.moving_arms import slip_of_arms
 from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
 from physics.model.features import cached_by_features
 from physics.motion.vectors import cross, rotated
 from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
+
+# kinds of surface with flat faces
+_FLAT = (PLANE, BOX, GRID)
 
 
 @cached_by_features
@@ -170,6 +174,7 @@ def make_prepare(features):
         G = frame.rotation if compound else surface.rotation
         Q, a, b = surface.rotation, owner.position, surface.position
         pair_mass, turns = constants.pair_mass, constants.axial != 0
+        radii, flat = constants.owner_radius, 1.0 if constants.kind in _FLAT else 0.0
         for n in range(slots):
             row, point = candidate[n], points[n]
             memory = row.memory
@@ -220,6 +225,17 @@ def make_prepare(features):
                 point.normal_impact[i] = 0.0
                 gx, gy, gz = normal_impulse * nx, normal_impulse * ny, normal_impulse * nz
                 if friction:
+                    tx, ty, tz = slip_of_arms(
+                        owner, surface, point, i, h, at(radii, i), axial and turns
+                    )
+                    tx, ty, tz = flat * tx, flat * ty, flat * tz
+                    point.slip_bend[0, i] = tx
+                    point.slip_bend[1, i] = ty
+                    point.slip_bend[2, i] = tz
+                    tx, ty, tz = tx if moves else 0.0, ty if moves else 0.0, tz if moves else 0.0
+                    point.last_slip_bend[0, i] = tx
+                    point.last_slip_bend[1, i] = ty
+                    point.last_slip_bend[2, i] = tz
                     px, py, pz = rotated(
                         Q, i, memory[TANGENT, i], memory[TANGENT + 1, i], memory[TANGENT + 2, i]
                     )
@@ -233,9 +249,9 @@ def make_prepare(features):
                     sx, sy, sz = rotated(
                         Q, i, memory[SHEAR, i], memory[SHEAR + 1, i], memory[SHEAR + 2, i]
                     )
-                    sx += h * ux
-                    sy += h * uy
-                    sz += h * uz
+                    sx += h * (ux - tx)
+                    sy += h * (uy - ty)
+                    sz += h * (uz - tz)
                     along = sx * nx + sy * ny + sz * nz
                     held = normal_impulse > 0.0
                     point.anchor[0, i] = sx - along * nx if held else 0.0

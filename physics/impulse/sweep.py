@@ -150,6 +150,11 @@ def make_sweep(features):
                     ux, uy, uz = relative_velocity(owner, surface, point, i)
                     un = ux * nx + uy * ny + uz * nz
                     sx, sy, sz = ux - un * nx, uy - un * ny, uz - un * nz
+                    arms = point.slip_bend if soft else point.last_slip_bend
+                    sign = 1.0 if soft else -1.0
+                    sx += sign * arms[0, i]
+                    sy += sign * arms[1, i]
+                    sz += sign * arms[2, i]
                     if soft:
                         sx += ANCHOR_RATE * anchor[0, i]
                         sy += ANCHOR_RATE * anchor[1, i]

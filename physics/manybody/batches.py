@@ -24,7 +24,7 @@ from physics.manybody.tables import (
 from physics.model.features import cached_by_features
 from physics.model.state import State
 from physics.model.tables import Model
-from physics.model.workspace import Workspace
+from physics.model.workspace import NORMAL_SUMS, Workspace
 from physics.spring.contacts import make_pair_contacts
 from physics.spring.mass_splitting import pair_normal, pair_parts, splits_mass
 
@@ -237,8 +237,8 @@ def make_batch_forces(features):
             gather_velocity(crowd.frame, pairs.first[b], one)
             gather_velocity(crowd.frame, pairs.second[b], two)
             if splits:
-                gather_columns(crowd.normals, pairs.first[b], 0, 6, one.normals)
-                gather_columns(crowd.normals, pairs.second[b], 0, 6, two.normals)
+                gather_columns(crowd.normals, pairs.first[b], 0, NORMAL_SUMS, one.normals)
+                gather_columns(crowd.normals, pairs.second[b], 0, NORMAL_SUMS, two.normals)
                 one.partners, two.partners = 2, 2  # or more
                 pair_normal(model, mine, last)
                 pair_parts(model, mine, last)

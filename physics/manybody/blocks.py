@@ -23,7 +23,7 @@ from physics.manybody.tables import (
 from physics.model.features import EULER, cached_by_features
 from physics.model.state import State
 from physics.model.tables import Model
-from physics.model.workspace import Workspace
+from physics.model.workspace import NORMAL_SUMS, Workspace
 from physics.motion.drives import make_drives, make_finger_coupling
 from physics.motion.fields import make_fields, make_present_velocities
 from physics.motion.gravity import gravity
@@ -279,17 +279,18 @@ def add_contacts(crowd, pairs, m, force, torque):
 
 @stage
 def add_normals(crowd, pairs, m):
-    """Sums n n^T over the pairs of each body."""
+    """Sums n n^T and the loads of friction over the pairs of each body."""
     for i in range(LANES):
         body = m * LANES + i
         sums = crowd.normals[body]
-        for c in range(6):
+        for c in range(NORMAL_SUMS):
             sums[c] = 0.0
         for n in range(crowd.incident_first[body], crowd.incident_first[body + 1]):
             b, lane = (crowd.incident[n] >> 1) // LANES, (crowd.incident[n] >> 1) % LANES
             if pairs.busy[b] != 0:
                 half_pairs = crowd.pair_kind[pairs.kind[b]].half_pair_count
-                normal = pairs.work[pairs.first_work[b] + half_pairs - 1].normal
+                work = pairs.work[pairs.first_work[b] + half_pairs - 1]
+                normal = work.normal
                 x, y, z = normal[0, lane], normal[1, lane], normal[2, lane]
                 sums[0] += x * x
                 sums[1] += y * y
@@ -297,6 +298,7 @@ def add_normals(crowd, pairs, m):
                 sums[3] += x * y
                 sums[4] += x * z
                 sums[5] += y * z
+                sums[6] += work.loads[crowd.incident[n] & 1, lane]
 
 
 @stage

@@ -31,7 +31,8 @@ from physics.model.features import cached_by_features
 from physics.model.workspace import GIVEN
 
 # what a collision does with all pairs, see `impact_steps.make_collide`
-FIND, ADD_HALVES, REMOVE_PUSH_OUT, SWEEP, RESTITUTE, ADD_WORK, SCALE, REMOVE_HALVES, DONE = range(9)
+LOOK_BACK, FIND, ADD_HALVES, REMOVE_PUSH_OUT, SWEEP = range(5)
+RESTITUTE, ADD_WORK, SCALE, REMOVE_HALVES, DONE = range(5, 10)
 
 
 @cached_by_features

@@ -8,6 +8,7 @@ substep, with the largest restitution among them.
 
 from physics.compiler.jit import LANES, sequence, stage
 from physics.impulse.restitution import MAX_SWEEPS, allowed_fraction
+from physics.manybody.blocks import blocks_of, change_velocities
 from physics.manybody.colours import make_by_colour
 from physics.manybody.couplings import make_begin_joints, make_keep_joints
 from physics.manybody.impact_batches import (
@@ -15,6 +16,7 @@ from physics.manybody.impact_batches import (
     ADD_WORK,
     DONE,
     FIND,
+    LOOK_BACK,
     REMOVE_HALVES,
     REMOVE_PUSH_OUT,
     RESTITUTE,
@@ -32,6 +34,7 @@ from physics.manybody.team import (
     RESTITUTION,
     WORK,
     largest,
+    share,
     takes_batch,
     total,
     wait,
@@ -57,6 +60,16 @@ def all_work(crowd, pairs, team):
         team.shared[0, WORK] = work
     wait(team)
     return team.shared[0, WORK]
+
+
+@stage
+def advance_velocities(crowd, time, team):
+    """Lets known forces change the velocities of all bodies for a time in s."""
+    first, last = share(0, crowd.group.shape[0], team)
+    for g in range(first, last):
+        for m in blocks_of(crowd, g):
+            change_velocities(crowd, m, time)
+    wait(team)
 
 
 @cached_by_features
@@ -90,32 +103,42 @@ def make_find(features):
 def make_collide(features):
     """Sequence of all instantaneous collisions of a substep.
 
-    What collides is found, and what of it still does without the push apart. It is compressed, gets
-    restitution, and gives back what that returned too much. These operations follow each other in a
-    loop that calls each stage in one place, because every further call would be compiled anew.
+    Velocities are half a step old; bodies collide with the present ones. What collides is found,
+    and what of it still does without the push apart. It is compressed, gets restitution, and gives
+    back what that returned too much. These operations follow each other in a loop that calls each
+    stage in one place, because every further call would be compiled anew.
     """
     find, book_impacts = make_find(features), make_book_impacts(features)
     change = make_by_colour(features, make_impact_batch(features))
     begin_joints, keep_joints = make_begin_joints(features), make_keep_joints(features)
+    joints = features.joints
 
     @sequence
-    def collide(model, workspace, rows, crowd, pairs, h, refresh, part, team, stamp):
+    def collide(model, workspace, rows, crowd, pairs, h, refresh, lag, part, team, stamp):
         """Returns the last stamp, and whether anything has collided.
 
-        `part`: see `restitution.make_find_impacts`.
+        `lag`: s by which velocities are old, which they lose here; `part`: that of the step.
         """
         mine, sweeps, compression, work, allowed = team.shared[team.thread], 0, 0.0, 0.0, 0.0
         mine[RESTITUTION] = 0.0
-        again, collided, restored = False, False, False
+        begun, collided, restored = False, False, False
         first = ADD_HALVES if part > 0.0 else REMOVE_PUSH_OUT
         last = REMOVE_HALVES if part > 0.0 else DONE
-        operation, value = FIND, part
+        operation, value = LOOK_BACK if joints else FIND, part
         while operation != DONE:
-            if operation == FIND:
-                stamp += 1
-                collides = find(model, workspace, rows, crowd, pairs, h, team, stamp, False, value)
-                if not again:
-                    again, operation = True, first if collides > 0.0 else DONE
+            if operation in (LOOK_BACK, FIND):
+                looks_back, left = operation == LOOK_BACK, 0.0 if operation == LOOK_BACK else value
+                if operation == FIND:
+                    stamp += 1
+                    if not begun:
+                        advance_velocities(crowd, lag, team)
+                collides = find(
+                    model, workspace, rows, crowd, pairs, h, team, stamp, looks_back, left
+                )
+                if looks_back:  # see `restitution.make_find_impacts`
+                    operation = FIND
+                elif not begun:
+                    begun, operation = True, first if collides > 0.0 else DONE
                 elif collides > 0.0:
                     begin_joints(model, workspace, crowd, True, True, 0.0, team)
                     collided, operation, value = True, SWEEP, largest(team, FASTEST)

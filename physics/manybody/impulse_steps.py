@@ -24,7 +24,7 @@ from physics.manybody.impact_paths import (
     make_choose_pairs,
     make_leave_impact,
 )
-from physics.manybody.impact_steps import make_collide, make_find
+from physics.manybody.impact_steps import advance_velocities, make_collide
 from physics.manybody.impulse_batches import (
     GUESS,
     RIGID,
@@ -67,10 +67,10 @@ def make_impulse_steps(features: Features):
     choose_pairs = make_choose_pairs(features)
     known_forces, hold_joints = make_known_forces(features), make_hold_joints(features)
     list_contacts, prepare_batch = make_list_contacts(features), make_prepare_batch(features)
-    find, collide = make_find(features), make_collide(features)
+    collide = make_collide(features)
     solve = make_by_colour(features, make_solve_batch(features))
     begin_joints, keep_joints = make_begin_joints(features), make_keep_joints(features)
-    end_joints, joints = make_end_joints(features), features.joints
+    end_joints = make_end_joints(features)
     finish_batch, end_step = make_finish_batch(features), make_end_step(features)
     before, lag = (1.0, 0.0) if features.integrator == EULER else (0.5, 0.5)
 
@@ -143,16 +143,10 @@ def make_impulse_steps(features: Features):
                         whole,
                     )  # fmt: skip
             wait(team)
-            if joints:  # see `restitution.make_find_impacts`
-                find(model, workspace, rows, crowd, pairs, span, team, stamp, True, 0.0)
-            # velocities are half a step old; bodies collide with the present ones
-            for g in range(first, last):
-                for m in blocks_of(crowd, g):
-                    change_velocities(crowd, m, lagging)
-            wait(team)
             stamp, collided = collide(
-                model, workspace, rows, crowd, pairs, span, drifted == 0.0, lagging / h, team, stamp
-            )
+                model, workspace, rows, crowd, pairs, span, drifted == 0.0, lagging, lagging / h,
+                team, stamp,
+            )  # fmt: skip
             if collided:
                 end_joints(model, workspace, crowd, span if refresh else 0.0, team)
             for g in range(first, last):
@@ -171,10 +165,7 @@ def make_impulse_steps(features: Features):
                 continue
             for operation in (RIGID, GUESS, SOFT):
                 if operation == GUESS:
-                    for g in range(first, last):
-                        for m in blocks_of(crowd, g):
-                            change_velocities(crowd, m, span)
-                    wait(team)
+                    advance_velocities(crowd, span, team)
                 clears, motor_time = operation == RIGID, 0.0 if operation == RIGID else span
                 if operation != SOFT:
                     begin_joints(model, workspace, crowd, clears, not clears, motor_time, team)

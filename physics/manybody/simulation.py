@@ -22,7 +22,7 @@ from physics.model.joints import joint_rows
 from physics.model.pairs import Layout
 from physics.model.state import STARTS_ANEW
 from physics.model.tables import DYNAMIC_PER_WORLD, Model
-from physics.model.workspace import GIVEN, JOINT_WORK, SOLID, START, Workspace
+from physics.model.workspace import GIVEN, JOINT_WORK, NORMAL_SUMS, SOLID, START, Workspace
 from physics.rotation import rotation_matrix
 from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
@@ -153,7 +153,7 @@ class CrowdSimulation(Simulation):
             motor=np.zeros((groups * LANES, found.motor[:, 1].max(initial=-1) + 1, 2)),
             frame=frame,
             tensor=np.zeros((places, 8)),
-            normals=np.zeros((places, 6)),
+            normals=np.zeros((places, NORMAL_SUMS)),
             margin=np.zeros((blocks, LANES)),
             motion=np.zeros((blocks, LANES)),
             wrench=np.zeros((0, 6)),

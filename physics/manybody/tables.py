@@ -118,8 +118,8 @@ class Crowd(NamedTuple):
         frame: [places, FRAME_WIDTH] of each solid side by side: position, rotation matrix,
             velocity, angular velocity, and displacement and rotation bound of the last drift.
         tensor: [places, 8] inverse inertia in the world frame: xx yy zz xy xz yz; impulse law.
-        normals: [places, 6] sums of n n^T over what each body touched in the last step, see
-            `spring.mass_splitting`: xx yy zz xy xz yz; spring law.
+        normals: [places, NORMAL_SUMS] over what each body touched in the last step, see
+            `spring.mass_splitting`: n n^T as xx yy zz xy xz yz, loads of friction; spring law.
         margin: [blocks, LANES] m that a body may move before pairs are searched again.
         motion: [blocks, LANES] m that it has moved since, at most.
         wrench: [blocks * LANES, 6] N and N m from the user.

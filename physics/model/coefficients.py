@@ -144,8 +144,18 @@ def contact_columns(
         "pair_mass": pair_mass,
         "shear_stiffness": shear_stiffness,
         "shear_damping": shear_damping,
+        **_grips(shear_stiffness, shear_damping, shear[:, a], shear[:, b], h),
         "friction": friction,
     }
+
+
+def _grips(stiffness: Array, damping: Array, one: Array, two: Array, h: float) -> Columns:
+    """Largest eigenvalues of a step's friction on two bodies with inverse masses `one` and `two`.
+
+    See `spring.mass_splitting`; likewise for resistance and inverse moments of inertia.
+    """
+    load, coupling = h * (damping + 0.5 * h * stiffness), np.sqrt(one * two)
+    return {"owner_grip": load * (one + coupling), "surface_grip": load * (two + coupling)}
 
 
 def shear_ratios(fidelity: Fidelity, given: Array) -> Array:
@@ -185,6 +195,17 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         np.array(SHEAR_RATIO),
         h,
     )
+
+    twist_stiffness = np.where(turns, twist_stiffness, 1.0)
+    twist_damping = np.where(turns, twist_damping, 0.0)
+    resisting = _grips(twist_stiffness, twist_damping, 1.0 / least[:, a], 1.0 / least[:, b], h)
+    resistance = np.array([
+        s.material.rolling_resistance + s.material.spinning_resistance
+        for s in solids
+    ])  # fmt: skip
+    resists = resistance[a] + resistance[b] > 0.0
+    for name, grip in resisting.items():
+        contact[name] = contact[name] + np.where(resists, grip, 0.0)
 
     # only the widths of dynamic bodies limit the skin
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
@@ -230,8 +251,8 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
         "overlap_share": _overlap_share(layout, mass, a, b),
         "surface_centre": _surface_centres(layout, size[:, b]),
         "surface_inverse_inertia": _surface_inverse_inertia(layout, p),
-        "twist_stiffness": np.where(turns, twist_stiffness, 1.0),
-        "twist_damping": np.where(turns, twist_damping, 0.0),
+        "twist_stiffness": twist_stiffness,
+        "twist_damping": twist_damping,
     }
 
 

@@ -29,6 +29,8 @@ CONTACT_ROW = np.dtype(
         # over the last one, see impulse/contact_rows.py
         ("bend", "f8", (LANES,)),
         ("last_bend", "f8", (LANES,)),
+        ("slip_bend", "f8", (3, LANES)),  # m/s, see impulse/moving_arms.py
+        ("last_slip_bend", "f8", (3, LANES)),  # m/s, of the last drift
         ("turned", "f8", (LANES,)),  # m/s, part of u n by a spin that moves no sample
         ("approach", "f8", (LANES,)),  # m/s, in the last drift; then after the impacts of the step
         ("rest_speed", "f8", (LANES,)),  # m/s, closing speed up to which it counts as at rest

@@ -96,6 +96,10 @@ HALF_PAIR = np.dtype(
         ("surface_inverse_inertia", "f8", (3,)),  # 1/(kg m^2) of that solid, where it matters
         ("shear_stiffness", "f8"),  # N/m
         ("shear_damping", "f8"),  # N s/m
+        # eigenvalues of a step's friction and resistance if each body touches one solid only, see
+        # spring/mass_splitting.py
+        ("owner_grip", "f8"),
+        ("surface_grip", "f8"),
         ("friction", "f8"),
         ("rolling", "f8"),  # m, rolling resistance
         ("spinning", "f8"),  # m, spinning resistance
@@ -131,6 +135,8 @@ HALF_PAIR_PER_WORLD = (
     "surface_inverse_inertia",
     "shear_stiffness",
     "shear_damping",
+    "owner_grip",
+    "surface_grip",
     "friction",
     "twist_stiffness",
     "twist_damping",

@@ -25,6 +25,9 @@ from physics.model.tables import Model
 
 Array = np.ndarray
 
+# rows of `SOLID.normals`
+NORMAL_SUMS = 7
+
 # one row per solid: dynamic bodies, statics, then compound parts, whose pose and velocity follow
 # their solid's
 SOLID = np.dtype(
@@ -60,12 +63,13 @@ SOLID = np.dtype(
         ("load_rate", "f8", (LANES,)),  # kg/s
         ("inverse_mean_force", "f8", (LANES,)),  # 1/N
         ("damping", "f8", (LANES,)),  # coefficient of the normal law at this step
+        ("grip", "f8", (LANES,)),  # see `HALF_PAIR_WORK.grip`
         ("gravity", "f8", (3, LANES)),  # m/s^2, see `HALF_PAIR.gravity`
         ("rest_speed", "f8", (LANES,)),  # m/s, lower bound of the impact speed on a plane
         ("normal_sum", "f8", (3, LANES)),  # of the samples in contact, times their weight
         # of mass splitting: n n^T summed over the solids touched in the last step, as xx yy zz xy
-        # xz yz; and the number of those that can be touched
-        ("normals", "f8", (6, LANES)),
+        # xz yz, and the loads of friction; and the number of those that can be touched
+        ("normals", "f8", (NORMAL_SUMS, LANES)),
         ("partners", "i8"),
     ],
     align=True,
@@ -90,7 +94,9 @@ HALF_PAIR_WORK = np.dtype(
         # of springs, of the pair: mean normal in the last step, or zero; and the parts into which
         # its mass is split, see spring/mass_splitting.py
         ("normal", "f8", (3, LANES)),
+        ("loads", "f8", (2, LANES)),  # of friction, on the first and second of its solids
         ("parts", "f8", (LANES,)),
+        ("grip", "f8", (LANES,)),  # factor on the damping of friction, likewise
         ("supported", "f8", (LANES,)),  # 1: a body of the pair touched something else, too
         ("current_normal_force", "f8", (LANES,)),
         ("slots", "i8"),  # the largest count

@@ -1,7 +1,7 @@
-"""Truths of theory that closed forms of single bodies on a plane don't show.
+"""Truths of theory that closed forms of single bodies on a plane don't show: those of balls.
 
 Contact forces on curved surfaces, several impacts at once, impacts without weight, plastic impacts
-of what slides, rocking, and states that are set. Each function simulates a scene at a fidelity, and
+of what slides, and states that are set. Each function simulates a scene at a fidelity, and
 returns what its docstring says; the right value stands beside it. Bodies have 0.1 kg.
 """
 
@@ -26,14 +26,11 @@ Engine = Level | Callable[[Scene, int], Any]
 
 GRAVITY = 9.81
 MASS = 0.1
-RADIUS = 0.02  # m, of balls; half the width of cubes
+RADIUS = 0.02  # m
 BALL: Shape = Sphere(RADIUS)
 RING = (0.3, 0.05)  # m, radii of the ring in which a ball swings
 PATH = RING[0] - RING[1] - RADIUS  # m, radius of its path
 DOME = 0.5  # m
-BLOCK = (0.015, 0.06)  # m, half width and half height of the block that rocks
-# Housner (1963): angular velocity after and before the impact of a slim block on its other edge
-ROCKING = 1.0 - 1.5 * BLOCK[0] ** 2 / (BLOCK[0] ** 2 + BLOCK[1] ** 2)
 
 
 def worlds_of(engine: Engine, scene: Scene, count: int = 1) -> Any:
@@ -41,13 +38,14 @@ def worlds_of(engine: Engine, scene: Scene, count: int = 1) -> Any:
     return engine(scene, count) if callable(engine) else World(scene, engine, count)
 
 
-def _step(level: Level, longest: float) -> float:
+def step_near(level: Level, longest: float) -> float:
     """Multiple of the substep that is near `longest` s."""
     h = resolve(level).substep
     return h * max(1, round(longest / h))
 
 
-def _ring(velocity: float, gravity: float, ball: Shape) -> Scene:
+def ring(velocity: float, gravity: float, ball: Shape = BALL) -> Scene:
+    """A smooth ball in an upright ring, level with its axis, that moves down at `velocity` m/s."""
     smooth = Material(friction=0.0)
     upright = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
     body = Body(ball, mass=MASS, position=(PATH, 0.0, 0.0), material=smooth,
@@ -61,7 +59,7 @@ def swinging_force(level: Level, ball: Shape = BALL) -> float:
 
     It starts at the height of the ring's axis. Right: 3. v^2 = 2 g R, so m g + m v^2/R = 3 m g.
     """
-    world, h = World(_ring(0.0, GRAVITY, ball), level), _step(level, 2e-3)
+    world, h = World(ring(0.0, GRAVITY, ball), level), step_near(level, 2e-3)
     force, height = 0.0, 0.0
     for _ in range(int(0.4 / h)):
         world.advance(h)
@@ -76,7 +74,7 @@ def circling_forces(level: Level, ball: Shape = BALL) -> tuple[float, float, flo
 
     Right: 1, each: of `World.normal_force`, of `World.force` and of the sum of `World.contacts`.
     """
-    world = World(_ring(1.7, 0.0, ball), level)
+    world = World(ring(1.7, 0.0, ball), level)
     world.advance(0.4)
     contact = np.linalg.norm(world.contacts().force.sum(axis=0))
     net, unit = np.linalg.norm(world.force()[0, 0]), MASS * 1.7**2 / PATH
@@ -97,69 +95,12 @@ def leaving_cosine(level: Level, ball: Shape = BALL) -> float:
     place = (distance * math.sin(start), 0.0, distance * math.cos(start))
     body = Body(ball, mass=MASS, position=place, material=smooth)
     world = World(Scene([body], [Static(Sphere(DOME), material=smooth)]), level)
-    h, cosine = _step(level, 2e-3), 1.0
+    h, cosine = step_near(level, 2e-3), 1.0
     for _ in range(int(1.0 / h)):
         world.advance(h)
         if world.normal_force(0, 1)[0] > 0.0:
             cosine = world.position[0, 0, 2] / np.linalg.norm(world.position[0, 0])
     return float(cosine / (2.0 / 3.0 * math.cos(start)))
-
-
-def dome_slide(level: Level) -> tuple[float, float]:
-    """Speed and normal force of a cube that slides down a dome of 1 m, over those of theory.
-
-    It starts at 0.3 rad with 0.8 m/s, mu = 0.2, and is compared at 0.6 rad. Right: 1 and 1.
-    """
-    rough, angle, core = Material(friction=0.2), 0.3, 1.0 + RADIUS
-    # friction turns the cube about its contact until that lies mu times its height downhill
-    behind = math.atan(0.2 * RADIUS / core)
-    distance, speed = core / math.cos(behind), 0.8
-    x, z = distance * math.sin(angle), distance * math.cos(angle)
-    half = 0.5 * (angle + behind)
-    cube = Body(
-        Box((RADIUS, RADIUS, RADIUS)), mass=MASS, position=(x, 0.0, z), material=rough,
-        orientation=(0.0, math.sin(half), 0.0, math.cos(half)),
-        linear_velocity=(speed * z / distance, 0.0, -speed * x / distance),
-        angular_velocity=(0.0, speed / distance, 0.0),
-    )  # fmt: skip
-    world = World(Scene([cube], [Static(Sphere(1.0), material=rough)]), level)
-    h, seen = _step(level, 2e-3), [(angle, speed, math.nan)]
-    while seen[-1][0] < 0.61 and len(seen) < 1000:
-        world.advance(h)
-        x, _, z = world.position[0, 0]
-        force = world.normal_force(0, 1)[0]
-        seen.append((math.atan2(x, z), float(np.linalg.norm(world.linear_velocity[0, 0])), force))
-    angles, speeds, forces = np.array(seen[1:]).T
-    exact, press = _slid(distance, behind, 0.2, angle, 0.6, speed)
-    near = np.abs(angles - 0.6) < 0.05  # the cube sways a little
-    force = np.polyval(np.polyfit(angles[near], forces[near], 1), 0.6)
-    return float(np.interp(0.6, angles, speeds) / exact), float(force / (MASS * press))
-
-
-def _slid(
-    radius: float, behind: float, friction: float, start: float, end: float, speed: float
-) -> tuple[float, float]:
-    """Speed in m/s and N/m in m/s^2 at the angle `end` rad of a body that slides on a circle.
-
-    Its contact is `behind` rad further on than its centre, so
-
-        N/m (cos b + mu sin b) = g cos a - v^2/R,    v dv/da = R (g sin a + N/m (sin b - mu cos b)).
-    """
-    radial = math.cos(behind) + friction * math.sin(behind)
-    along = math.sin(behind) - friction * math.cos(behind)
-
-    def press(angle: float, square: float) -> float:
-        return (GRAVITY * math.cos(angle) - square / radius) / radial
-
-    def rate(angle: float, square: float) -> float:
-        return 2.0 * radius * (GRAVITY * math.sin(angle) + press(angle, square) * along)
-
-    square, step = speed**2, (end - start) / 1000
-    for n in range(1000):
-        angle = start + n * step
-        middle = square + 0.5 * step * rate(angle, square)
-        square += step * rate(angle + 0.5 * step, middle)
-    return math.sqrt(square), press(end, square)
 
 
 def _others(count: int) -> list[Body]:
@@ -273,38 +214,7 @@ def bounced_energy(level: Level, ball: Shape = BALL, count: int = 32) -> Array:
     return np.asarray((world.potential_energy() + world.kinetic_energy()) / before)
 
 
-def rocking(level: Level, count: int = 24) -> Array:
-    """[count] angular velocity after over before the impact of a block that rocks, e = 0, mu = 1.
-
-    It is let go at half to 0.6 of the angle at which it would tip. Right: `ROCKING`, by the angular
-    momentum about the edge that is hit (Housner 1963). The speeds follow from the largest angles.
-    """
-    rounding = resolve(level).rounding * BLOCK[0]
-    wide, high = BLOCK[0] - rounding, BLOCK[1] - rounding  # of the core
-    tip = math.atan2(wide, high)
-    start = np.linspace(0.5, 0.6, count) * tip
-    block = Body(Box((BLOCK[0], *BLOCK)), mass=MASS, material=Material(1.0))
-    world = World(Scene([block], [Ground(material=Material(1.0))]), level, count)
-    position, orientation = np.zeros((count, 1, 3)), np.zeros((count, 1, 4))
-    position[:, 0, 0] = high * np.sin(start) - wide * np.cos(start)
-    position[:, 0, 2] = rounding + wide * np.sin(start) + high * np.cos(start)
-    orientation[:, 0, 1], orientation[:, 0, 3] = np.sin(0.5 * start), np.cos(0.5 * start)
-    world.set_state(position=position, orientation=orientation)
-    h, angles = _step(level, 1e-3), []
-    for _ in range(int(0.6 / h)):
-        world.advance(h)
-        angles.append(2.0 * np.arctan2(world.orientation[:, 0, 1], world.orientation[:, 0, 3]))
-    ratios = []
-    for begins, angle in zip(start, np.array(angles).T, strict=True):
-        over = int(np.argmax(angle < 0.0))
-        far = -angle[over : over + int(0.3 / h)].min()
-        rises, falls = (math.cos(tip - a) - math.cos(tip) for a in (far, begins))
-        ratios.append(math.sqrt(max(rises, 0.0) / falls))
-    return np.array(ratios)
-
-
-# what a table of all truths shows: name, right value, and the measured value at a fidelity; first
-# those of balls, whose shape can be another one that is a ball
+# what a table shows: name, right value, and the one measured at a fidelity, of any shape of a ball
 BALLS: tuple[tuple[str, float, Callable[[Level, Shape], float]], ...] = (
     ("force at the bottom of a swing in a ring, over m g", 3.0, swinging_force),
     (
@@ -346,9 +256,4 @@ BALLS: tuple[tuple[str, float, Callable[[Level, Shape], float]], ...] = (
         1.0,
         lambda f, b: bounced_energy(f, b).min(),
     ),
-)
-OTHERS: tuple[tuple[str, float, Callable[[Level], float]], ...] = (
-    ("speed of a cube that slides down a dome, over theory", 1.0, lambda f: dome_slide(f)[0]),
-    ("its normal force, over theory", 1.0, lambda f: dome_slide(f)[1]),
-    ("rocking block, speed after over before, mean", ROCKING, lambda f: rocking(f).mean()),
 )

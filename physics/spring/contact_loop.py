@@ -76,6 +76,7 @@ def make_contact_loop(features, kind, report):
         impact_sum, closing_sum = relative.impact_sum, relative.closing_sum
         inverse_masses, speeds_per_load = relative.inverse_mass, relative.speed_per_load
         load_rates, inverse_mean_forces = relative.load_rate, relative.inverse_mean_force
+        grips = relative.grip
         current_weight, normal_sum = relative.current_weight, relative.normal_sum
         inverse_inertia, centre = constants.surface_inverse_inertia, constants.surface_centre
         face_normals, axial = constants.face_normals != 0, constants.axial != 0
@@ -92,7 +93,7 @@ def make_contact_loop(features, kind, report):
                 radius, owner_radius = at(radii, i), at(owner_radii, i)
                 ca, cb, cc = at(core[0], i), at(core[1], i), at(core[2], i)
                 k, a = at(stiffness, i), damping[i]
-                shear_k, shear_c = at(shear_stiffness, i), at(shear_damping, i)
+                shear_k, shear_c = at(shear_stiffness, i), grips[i] * at(shear_damping, i)
                 mass, load_rate = at(pair_mass, i), load_rates[i]
                 share = at(overlap_share, i)
                 inverse_mass, speed_per_load = inverse_masses[i], speeds_per_load[i]
@@ -248,7 +249,7 @@ def make_contact_loop(features, kind, report):
                         ny,
                         nz,
                         at(twist_stiffness, i),
-                        at(twist_damping, i),
+                        grips[i] * at(twist_damping, i),
                         rolling,
                         spinning,
                         h,

@@ -17,21 +17,37 @@ for each of a floor and a wall, which don't disturb each other. The normals are 
 step, so a contact is alone in its first. One solid that presses from two sides, as a slot does,
 counts as one: the samples of a pair have one mean normal.
 
-The damping keeps the whole mass. With a part of it, hands that close on a body rebound too fast,
-and a gripper loses its cube (docs/decisions/0007-normal-force.md). The dashpot has no load. Mass
-splitting of contacts that are solved at once: Tonge, Benevolenski and Voroshilov 2012.
+Friction, too, is chosen as if each contact acted alone. In a step its damping c changes the slip of
+two bodies by the part h (c + h k_t / 2) (w_1 + w_2), with their inverse masses w for a force at the
+surface, which rotation makes larger. All contacts of a body turn it at once. By Gershgorin's
+circles no mode of a heap overshoots, and friction can't drive it, if for each body the sum of
+
+    a_i = h (c_i + h k_t,i / 2) (w + sqrt(w w_i))
+
+over its contacts i is at most 2. So where that sum was larger in the last step, the damping of each
+contact is multiplied by its `grip`: 2 over the sum, the smaller one of its two bodies. Cubes and
+balls keep all of it up to two contacts. Without it a heap of rough balls boils for ever.
+
+The damping of the normal law keeps the whole mass. With a part of it, hands that close on a body
+rebound too fast, and a gripper loses its cube (docs/decisions/0007-normal-force.md). The dashpot
+has no load. Mass splitting of contacts that are solved at once: Tonge, Benevolenski and Voroshilov
+2012.
 """
 
 import math
 
 from physics.compiler.jit import LANES, at, stage
 from physics.model.features import ADAPTIVE, RK4
+from physics.model.workspace import NORMAL_SUMS
 from physics.scene.shapes import PLANE
+
+# eigenvalue of a step at which a mode only changes its sign
+_FLIP = 2.0
 
 
 def splits_mass(features):
     """Whether masses are split: not where steps of zero length only evaluate forces."""
-    return not features.dashpot and features.integrator not in (RK4, ADAPTIVE)
+    return features.integrator not in (RK4, ADAPTIVE)
 
 
 @stage
@@ -64,15 +80,24 @@ def count_partners(model, workspace):
 def pair_normal(model, workspace, k):
     """Writes the mean normal of a pair in the last step, zero where it didn't touch.
 
-    k: the last half-pair of the pair, which keeps it.
+    And its shear loads. k: the last half-pair of the pair, which keeps them.
     """
-    owner, normal = model.half_pair[k].owner, workspace.half_pair[k].normal
+    first = model.half_pair[k]
+    owner, normal, loads = first.owner, workspace.half_pair[k].normal, workspace.half_pair[k].loads
+    one, two = first.owner_grip, first.surface_grip
+    row = 0 if owner < first.surface else 1
     for c in range(3):
         for i in range(LANES):
             normal[c, i] = 0.0
+    for c in range(2):
+        for i in range(LANES):
+            loads[c, i] = 0.0
     other = k
     while True:
         half_pair, live = model.half_pair[other], workspace.half_pair[other]
+        for i in range(LANES):
+            loads[row, i] += live.previous_weight[i] * at(one, i)
+            loads[1 - row, i] += live.previous_weight[i] * at(two, i)
         if half_pair.kind == PLANE:  # its normal is the z axis
             for i in range(LANES):
                 normal[2, i] += live.previous_weight[i]
@@ -94,9 +119,11 @@ def pair_normal(model, workspace, k):
 
 
 @stage
-def add_normal(solid, normal, plane):
-    """Adds n n^T to the sums of a body."""
+def add_normal(solid, normal, load, plane):
+    """Adds n n^T and the shear load to the sums of a body."""
     sums = solid.normals
+    for i in range(LANES):
+        sums[6, i] += load[i]
     if plane:
         for i in range(LANES):
             sums[2, i] += normal[2, i]
@@ -112,12 +139,13 @@ def add_normal(solid, normal, plane):
 
 
 @stage
-def add_parts(solid, inverse_mass, pair_mass, normal, plane, parts, supported):
+def add_parts(solid, inverse_mass, pair_mass, normal, plane, live):
     """Adds what a body adds to the parts of a pair: n - 1, weighted by its inverse mass.
 
-    Exactly 0 where it touched one solid or none. Also marks pairs of bodies that touched others.
+    Exactly 0 where it touched one solid or none. Also limits the pair's grip, and marks pairs of
+    bodies that touched others.
     """
-    sums = solid.normals
+    sums, parts, supported, grip = solid.normals, live.parts, live.supported, live.grip
     for i in range(LANES):
         # the number of solids, but for round-off
         solids = sums[0, i] + sums[1, i] + sums[2, i]
@@ -133,6 +161,7 @@ def add_parts(solid, inverse_mass, pair_mass, normal, plane, parts, supported):
         more = max(n - 1.0, 0.0) if several else 0.0
         parts[i] += more * at(inverse_mass, i) * at(pair_mass, i)
         supported[i] = 1.0 if solids - own > 0.5 else supported[i]
+        grip[i] = min(grip[i], _FLIP / max(sums[6, i], _FLIP) if several else 1.0)
 
 
 @stage
@@ -140,13 +169,13 @@ def pair_parts(model, workspace, k):
     """Writes into how many parts the mass of a pair is split.
 
     That is the mean of n of its two bodies, with their inverse masses as weights. Also writes
-    whether one of them touched another solid in the last step. k: the last half-pair of the pair;
-    the others get a copy.
+    their grip, and whether one of them touched another solid in the last step. k: the last
+    half-pair of the pair; the others get a copy.
     """
     half_pair, live = model.half_pair[k], workspace.half_pair[k]
     owner, surface = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
     parts, normal, plane = live.parts, live.normal, half_pair.kind == PLANE
-    supported = live.supported
+    supported, grip = live.supported, live.grip
     one, two, pair_mass = (
         half_pair.owner_inverse_mass,
         half_pair.surface_inverse_mass,
@@ -155,16 +184,18 @@ def pair_parts(model, workspace, k):
     for i in range(LANES):
         parts[i] = 1.0
         supported[i] = 0.0
+        grip[i] = 1.0
     if owner.partners > 1:
-        add_parts(owner, one, pair_mass, normal, plane, parts, supported)
+        add_parts(owner, one, pair_mass, normal, plane, live)
     if surface.partners > 1:
-        add_parts(surface, two, pair_mass, normal, plane, parts, supported)
+        add_parts(surface, two, pair_mass, normal, plane, live)
     other = half_pair.next_in_pair
     while other != k:
-        same, too = workspace.half_pair[other].parts, workspace.half_pair[other].supported
+        same = workspace.half_pair[other]
         for i in range(LANES):
-            same[i] = parts[i]
-            too[i] = supported[i]
+            same.parts[i] = parts[i]
+            same.supported[i] = supported[i]
+            same.grip[i] = grip[i]
         other = model.half_pair[other].next_in_pair
 
 
@@ -175,7 +206,7 @@ def split_masses(model, workspace):
     for m in range(model.dynamic.shape[0]):
         if workspace.solid[m].partners > 1:
             sums = workspace.solid[m].normals
-            for c in range(6):
+            for c in range(NORMAL_SUMS):
                 for i in range(LANES):
                     sums[c, i] = 0.0
     for k in range(model.half_pair.shape[0]):
@@ -185,10 +216,12 @@ def split_masses(model, workspace):
         if several and closes_near_pair(model, workspace, k):
             pair_normal(model, workspace, k)
             normal, plane = workspace.half_pair[k].normal, half_pair.kind == PLANE
+            loads, swapped = workspace.half_pair[k].loads, half_pair.owner > half_pair.surface
+            row = 1 if swapped else 0
             if owner.partners > 1:
-                add_normal(owner, normal, plane)
+                add_normal(owner, normal, loads[row], plane)
             if surface.partners > 1:
-                add_normal(surface, normal, plane)
+                add_normal(surface, normal, loads[1 - row], plane)
     for k in range(model.half_pair.shape[0]):
         if closes_near_pair(model, workspace, k):
             pair_parts(model, workspace, k)

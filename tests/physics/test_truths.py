@@ -11,7 +11,7 @@ import pytest
 
 from physics import PRESETS, Box, Fidelity, Ground, Mesh, Particles, Scene, Sphere
 from physics.model.pairs import Layout
-from physics.reference import meshes, truths
+from physics.reference import blocks, meshes, truths
 
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 BALL, CUBE = Sphere(truths.RADIUS), Box((truths.RADIUS,) * 3)
@@ -31,7 +31,7 @@ def test_a_ring_presses_on_a_ball_with_its_weight_and_its_inertia(level, stress)
     "level", ["balanced", "solid", NEWTON], ids=["balanced", "solid", "newton"]
 )
 def test_a_cube_slides_down_a_dome_with_the_force_of_theory(level):
-    assert truths.dome_slide(level) == pytest.approx((1.0, 1.0), rel=5e-3)
+    assert blocks.dome_slide(level) == pytest.approx((1.0, 1.0), rel=5e-3)
 
 
 @pytest.mark.parametrize(("level", "error"), [("balanced", 0.05), ("solid", 0.02), (NEWTON, 0.02)])
@@ -99,8 +99,8 @@ def test_a_ball_that_falls_from_ten_metres_keeps_its_energy_in_ten_bounces(level
 )
 def test_a_rocking_block_keeps_its_angular_momentum_about_the_edge_that_it_hits(level, error):
     """First order in the step: at 2 ms the impact comes up to half a step early or late."""
-    ratios = truths.rocking(level)
-    assert ratios.mean() == pytest.approx(truths.ROCKING, rel=error)
+    ratios = blocks.rocking(level)
+    assert ratios.mean() == pytest.approx(blocks.ROCKING, rel=error)
 
 
 @pytest.mark.parametrize("level", ["solid", "fast", "accurate"])
