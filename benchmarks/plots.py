@@ -12,7 +12,7 @@ from benchmarks.draw import env_steps, pixels, scenes, tasks, trade
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.results_file import load
 from benchmarks.report.tables import Table
-from benchmarks.trade import impacts, rotating, sliding, standing, store
+from benchmarks.trade import impacts, rotating, sliding, standing, store, truths
 
 
 class Plot(NamedTuple):
@@ -45,6 +45,7 @@ TRADE = {
     ROOT / "docs/trade/impacts.png": tuple(trial.name for trial in impacts.TRIALS),
     ROOT / "docs/trade/standing.png": tuple(trial.name for trial in standing.TRIALS),
     ROOT / "docs/trade/rotation.png": tuple(trial.name for trial in rotating.TRIALS),
+    ROOT / "docs/trade/truths.png": tuple(trial.name for trial in truths.TRIALS),
 }  # fmt: skip
 
 

@@ -1,5 +1,8 @@
 """Stiffness of a world's contacts and its mass matrix, as the stability limit needs them."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from physics.analysis.diagnostics import report
@@ -7,34 +10,30 @@ from physics.model.features import Features
 from physics.model.rocking import point_jacobian
 from physics.model.state import State
 from physics.model.tables import Model
+from physics.model.tangential import grip_of
 from physics.rotation import rotation_matrix
 
 Array = np.ndarray
 
-# eigenvalue at which a mode that flips becomes unstable
-_FLIP = 2.0
-
 
 def unit_stiffness(
     model: Model, features: Features, state: State, world: int
-) -> dict[int, tuple[Array, Array, Array, float]]:
+) -> dict[int, tuple[Array, Array, Array, float, float]]:
     """Unit stiffness of a world's present contacts, by half-pair.
 
     Returns:
         For each half-pair in contact three matrices [6 m, 6 m]: along the normals, across them, and
-        against relative rotation, the last two less as `grips` says. Coordinates are the
-        displacement and the rotation vector of each dynamic body, in the world frame. And what
-        `mass_parts` gives.
+        against relative rotation. Coordinates are the displacement and the rotation vector of each
+        dynamic body, in the world frame. And what `mass_parts` and `grips` give.
     """
     touching = report(model, features, state, world)
     model = model.of_world(world)
     dynamic_count = len(model.dynamic)
-    found: dict[int, tuple[Array, Array, Array, float]] = {}
+    found: dict[int, tuple[Array, Array, Array, float, float]] = {}
     rows = model.half_pair[touching.half_pair]
     ends = np.stack([rows["owner"], rows["surface"]], axis=-1)
     parts = mass_parts(ends, touching.normal, touching.weight, model.dynamic["inverse_mass"])
-    loads = np.stack([rows["owner_grip"], rows["surface_grip"]], axis=-1)
-    grip = grips(ends, touching.weight, loads, dynamic_count)
+    grip = grips(ends, touching.weight, list(rows), dynamic_count)
     for k, point, normal, weight, part, held in zip(
         touching.half_pair, touching.point, touching.normal, touching.weight, parts, grip,
         strict=True,
@@ -48,10 +47,11 @@ def unit_stiffness(
                 jacobian[:, columns] = sign * point_jacobian(arm)
                 rotation[:, 6 * solid + 3 : 6 * solid + 6] = sign * np.eye(3)
         along = jacobian.T @ np.outer(normal, normal) @ jacobian
-        across = held * (jacobian.T @ jacobian - along)
-        along_k, across_k, turn_k, _ = found.get(int(k), (0.0, 0.0, 0.0, 1.0))
-        turn = turn_k + held * weight * rotation.T @ rotation
-        found[int(k)] = (along_k + weight * along, across_k + weight * across, turn, float(part))
+        across = jacobian.T @ jacobian - along
+        along_k, across_k, turn_k, *_ = found.get(int(k), (0.0, 0.0, 0.0, 1.0, 1.0))
+        turn = turn_k + weight * rotation.T @ rotation
+        sums = along_k + weight * along, across_k + weight * across, turn
+        found[int(k)] = (*sums, float(part), float(held))
     return found
 
 
@@ -89,22 +89,26 @@ def mass_parts(ends: Array, normal: Array, weight: Array, inverse_mass: Array) -
     return split[pair]
 
 
-def grips(ends: Array, weight: Array, loads: Array, bodies: int) -> Array:
+def grips(ends: Array, weight: Array, rows: Sequence[Any], bodies: int) -> Array:
     """By how much `spring.mass_splitting` reduces the damping of friction at each contact.
 
     Args:
         ends: [n, 2] owner and surface of each contact; beyond the bodies they don't move.
         weight: [n].
-        loads: [n, 2] `owner_grip` and `surface_grip`.
+        rows: [n] of HALF_PAIR.
         bodies: number of bodies.
 
     Returns:
         [n] factors; of a body that touches others with a part of a face only, too large.
     """
+    loads = np.array([[row["owner_shear_load"], row["surface_shear_load"]] for row in rows])
     index, sums = np.minimum(ends, bodies), np.zeros(bodies + 1)
-    np.add.at(sums, index, weight[:, None] * loads)
+    np.add.at(sums, index, weight[:, None] * loads.reshape(-1, 2))
     sums[bodies] = 0.0
-    return np.asarray((_FLIP / np.maximum(sums, _FLIP))[index].min(axis=1, initial=1.0))
+    largest = sums[index].max(axis=1, initial=0.0)
+    return np.array(
+        [grip_of(load, row["spring_part"]) for load, row in zip(largest, rows, strict=True)]
+    )
 
 
 def inverse_masses(model: Model, state: State, world: int) -> Array:

@@ -63,8 +63,7 @@ class ContactSystem:
         inertia = np.where(np.isfinite(constants["inertia"]), constants["inertia"], 0.0)
         self._inertia = np.einsum("bij,bj,bkj->bik", turn, inertia, turn)  # a drive never rotates
         self._constants = constants
-        loads = np.array([[row["owner_grip"], row["surface_grip"]] for row in rows])
-        self._grips = grips(ends, weight, loads.reshape(-1, 2)[kind], self._count)
+        self._grips = grips(ends, weight, [rows[n] for n in kind], self._count)
         self._parts = np.ones(len(kind))
         if not dashpot:
             self._parts = mass_parts(ends, normal, weight, constants["inverse_mass"])
@@ -104,9 +103,12 @@ class ContactSystem:
         for n, row in enumerate(self._rows):
             own = self._kind == n
             along[own] = stability.normal_load(row, dashpot, h, self._parts[own])
-        across = np.array([stability.shear_load(row, viscous, h) for row in self._rows])
-        twist = np.array([stability.twist_load(row, h) for row in self._rows])
-        return along, self._grips * across[self._kind], self._grips * twist[self._kind]
+        grips, across, twist = self._grips, np.zeros(len(self._kind)), np.zeros(len(self._kind))
+        for n, row in enumerate(self._rows):
+            own = self._kind == n
+            across[own] = stability.shear_load(row, viscous, h, grips[own])
+            twist[own] = stability.twist_load(row, h, grips[own])
+        return along, across, twist
 
     def _accelerate(self, loads: tuple[Array, Array, Array], servo: Array, x: Array) -> Array:
         """M^-1 A x, see `analysis.stability`."""

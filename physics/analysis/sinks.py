@@ -14,10 +14,12 @@ import math
 
 import numpy as np
 
+from physics.meshes.support import surrounds
 from physics.model.tables import Model
 from physics.rotation import rotation_matrix
 from physics.scene.mesh import Mesh
 from physics.scene.scene import Scene
+from physics.scene.shapes import PLANE
 
 Array = np.ndarray
 
@@ -41,7 +43,8 @@ def depth_on_plane(heights: Array, weights: Array, compliance: float) -> float:
 def rest_depth(scene: Scene, model: Model, half_pair: int, load: float) -> float:
     """Depth in m to which the owner of a half-pair sinks under a load in kg, as it first stands.
 
-    Of a mesh on a solid that isn't a body; others have flat sides.
+    Of a mesh on a solid that isn't a body, if what carries it surrounds its centre of mass. All
+    else counts as lying on a flat side.
     """
     row, gravity = model.half_pair[half_pair], math.hypot(*scene.gravity)
     compliance = gravity * load / float(row["stiffness"])
@@ -52,6 +55,11 @@ def rest_depth(scene: Scene, model: Model, half_pair: int, load: float) -> float
     if not isinstance(body.shape, Mesh):
         return compliance
     samples = model.sample[:, first : first + int(row["sample_count"])]
-    up = -np.array(scene.gravity) / gravity @ rotation_matrix(np.array(body.orientation))
+    up = -np.array(scene.gravity) / gravity
+    if int(row["kind"]) == PLANE:
+        up = np.array([0.0, 0.0, 1.0])
+    up = up @ rotation_matrix(np.array(body.orientation))
     heights = up @ samples[:3]
-    return depth_on_plane(heights - heights.min(), samples[3], compliance)
+    depth = depth_on_plane(heights - heights.min(), samples[3], compliance)
+    carries = heights < heights.min() + depth
+    return depth if surrounds(samples[:3, carries].T, up) else compliance

@@ -65,19 +65,20 @@ def normal_load(half_pair: Any, dashpot: bool, h: float, parts: Any = 1.0) -> An
     return 0.5 * (approaching + parting)
 
 
-def shear_load(half_pair: Any, viscous: bool, h: float) -> float:
-    """A in kg of a half-pair's whole shear stiffness."""
+def shear_load(half_pair: Any, viscous: bool, h: float, grip: Any = 1.0) -> Any:
+    """A in kg of a half-pair's whole shear stiffness. `grip`: see `contact_stiffness.grips`."""
     if half_pair["friction"] == 0.0:
         return 0.0
     spring = 0.0 if viscous else 0.5 * h * h * float(half_pair["shear_stiffness"])
-    return h * float(half_pair["shear_damping"]) + spring
+    return grip * h * float(half_pair["shear_damping"]) + spring
 
 
-def twist_load(half_pair: Any, h: float) -> float:
+def twist_load(half_pair: Any, h: float, grip: Any = 1.0) -> Any:
     """A in kg m^2 of a half-pair's whole resistance against rolling and spinning."""
     if half_pair["rolling"] == 0.0 and half_pair["spinning"] == 0.0:
         return 0.0
-    return h * float(half_pair["twist_damping"]) + 0.5 * h * h * float(half_pair["twist_stiffness"])
+    spring = 0.5 * h * h * float(half_pair["twist_stiffness"])
+    return grip * h * float(half_pair["twist_damping"]) + spring
 
 
 def servo_load(dynamic: Any, h: float) -> float:
@@ -125,12 +126,12 @@ def of_contacts(model: Model, features: Features, state: State, world: int) -> f
 
     def load(h: float) -> float:
         A = np.zeros_like(inverse)
-        for k, (along, across, turn, parts) in contacts.items():
+        for k, (along, across, turn, parts, grip) in contacts.items():
             half_pair = model.half_pair[k]
             A += normal_load(half_pair, features.dashpot, h, parts) * along
             A += (
-                shear_load(half_pair, features.viscous, h) * across
-                + twist_load(half_pair, h) * turn
+                shear_load(half_pair, features.viscous, h, grip) * across
+                + twist_load(half_pair, h, grip) * turn
             )
         for i, dynamic in enumerate(model.dynamic):
             block = slice(6 * i, 6 * i + 3)

@@ -231,11 +231,14 @@ def make_search(features):
             separation = max(separation, separation_bound(half_pair, i, relative))
         reach = at(half_pair.skin, i)
         one, two = workspace.solid[half_pair.owner], workspace.solid[half_pair.surface]
-        spins = one.rotation_bound[i] + two.rotation_bound[i]
+        slow = one.rotation_bound[i] <= at(half_pair.owner_reach, i)
+        slow &= (half_pair.kind == PLANE) | (
+            two.rotation_bound[i] <= at(half_pair.surface_reach, i)
+        )
         # samples that touch by the middle of the next drift have a force in this step, or collide
         # before they overlap; more than `find_impacts` accepts, by more than round-off. Not of
         # springs on bodies that turn by more than a radian: their samples move on no straight line
-        straight = impulse | (spins <= at(half_pair.owner_reach, i))
+        straight = impulse | slow
         if straight & (half_pair.partner_count == 0):
             reach = max(reach, 0.5 * relative_motion + 2.0 * TOUCH_TOLERANCE)
         count = 0

@@ -16,7 +16,7 @@ turn could leap over its border. (Elastic cylinders and boxes that hit each othe
 up to five times their energy.) There fixed samples are used.
 
 A circle parallel to the surface has no nearest point. It keeps the angle at which it is in the
-body, because of a bias: a tilt of _BIAS rad that is added to the real one. Evenly spaced samples,
+body, because of a bias: a tilt of BIAS rad that is added to the real one. Evenly spaced samples,
 three or more, resist any tilt as a whole circle does, whatever their angle.
 """
 
@@ -29,18 +29,18 @@ from physics.scene.shapes import BOX, PLANE
 # kinds of surface over which samples turn
 FLOORS = (PLANE, BOX)
 
-# rad. It displaces the lowest point of a circle that is tilted by more by _BIAS / tilt rad at most.
+# rad. It displaces the lowest point of a circle that is tilted by more by BIAS / tilt rad at most.
 # At 1e-6 a ring that lies under the impulse law wobbles on at 0.01 rad/s, by a micrometre: its
 # samples turn with the wobble. At 1e-3 elastic landings of a ring gain 0.3 % of energy, at 1e-4 as
 # little as without a bias
-_BIAS = 1e-4
+BIAS = 1e-4
 
 
 @stage
 def _turned(x, y, mx, my, mz):
     """Turns x y about z such that x points against the normal m, given in the body's frame."""
     # none for a body on its side, which rolls
-    dx, dy = _BIAS * mz * mz - mx, -my
+    dx, dy = BIAS * mz * mz - mx, -my
     length = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / max(length, 1e-150)
     cosine = dx * inverse if length > 1e-150 else 1.0

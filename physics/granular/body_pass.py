@@ -26,6 +26,7 @@ from physics.granular.tables import (
 from physics.integrators.drift import make_drift
 from physics.integrators.kick import make_kick
 from physics.model.features import EULER, cached_by_features
+from physics.model.workspace import SHEAR_SUM
 from physics.motion.gravity import gravity
 from physics.motion.kinematics import make_kinematics
 
@@ -100,11 +101,12 @@ def store_states(heap, states, group, row):
 def sum_forces(heap, scratch, group, solid):
     """Adds the forces of all slabs' pairs on a lane group, in the order of the slabs.
 
-    And the shear loads, in `SOLID.grip`.
+    And the shear loads, in `SOLID.normals`.
     """
     place = group * LANES
+    loads = solid.normals[SHEAR_SUM]
     for i in range(LANES):
-        solid.grip[i] = 0.0
+        loads[i] = 0.0
     for s in range(SLABS):
         low, high = heap.force_range[s, 0], heap.force_range[s, 1]
         if low < place + LANES and high > place:
@@ -114,7 +116,7 @@ def sum_forces(heap, scratch, group, solid):
                 for c in range(3):
                     solid.force[c, i] += scratch.force[b, c]
                     solid.torque[c, i] += scratch.force[b, 3 + c]
-                solid.grip[i] += scratch.force[b, 6]
+                loads[i] += scratch.force[b, 6]
 
 
 @stage
@@ -276,7 +278,7 @@ def make_body_pass(features):
                 )  # fmt: skip
                 if friction and not refresh:
                     for i in range(LANES):
-                        heap.motion[group * LANES + i, SHEAR_LOAD] = solid.grip[i]
+                        heap.motion[group * LANES + i, SHEAR_LOAD] = solid.normals[SHEAR_SUM, i]
                 if not euler and what & KICK:
                     kick(model, workspace, 0.5 * h)
                 copy_rows(row.force, solid.force, 3)

@@ -5,9 +5,6 @@ import math
 from physics.compiler.jit import stage
 from physics.model.tangential import tangential_coefficients
 
-# eigenvalue of a step at which a mode only changes its sign
-_FLIP = 2.0
-
 
 @stage
 def contact_coefficients(
@@ -43,23 +40,19 @@ def contact_coefficients(
 
 @stage
 def shear_loads(stiffness, damping, first, second, weight, step):
-    """What a contact adds to the largest eigenvalues of a step's friction on its two bodies.
+    """Shear loads of a contact on its two bodies, and their part that is due to the spring.
 
     See `spring.mass_splitting`.
 
     Args:
-        stiffness: N/m, of the shear spring.
+        stiffness: N/m, of the shear spring; 0 of viscous friction.
         damping: N s/m, before it is reduced.
         first: 1/kg, inverse shear mass of the owner.
         second: likewise of the surface; 0 of a static.
         weight: of the particle.
         step: s.
     """
-    load, coupling = weight * step * (damping + 0.5 * step * stiffness), math.sqrt(first * second)
-    return load * (first + coupling), load * (second + coupling)
-
-
-@stage
-def grip_of(load, other):
-    """Factor on the damping of friction with which no body's eigenvalue exceeds that of a flip."""
-    return min(_FLIP / max(load, _FLIP), _FLIP / max(other, _FLIP))
+    spring, coupling = 0.5 * step * stiffness, math.sqrt(first * second)
+    load = weight * step * (damping + spring)
+    part = spring / max(damping + spring, 1e-300)
+    return load * (first + coupling), load * (second + coupling), part

@@ -22,6 +22,7 @@ from physics.granular.tables import (
     REBUILDS,
     RESULTS,
     SCALES,
+    SHEAR_LOAD,
     SKIN,
     SLABS,
     TICKET,
@@ -271,5 +272,6 @@ def _sort_rows(body: Array, places: Array) -> None:
 
 def forget(heap: Heap) -> None:
     """Contacts remember nothing, and the list must be made again."""
+    heap.motion[:, SHEAR_LOAD] = 0.0
     heap.counts[EVALUATION] += 1
     heap.counts[VALID] = 0

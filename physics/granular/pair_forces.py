@@ -10,7 +10,7 @@ import numpy as np
 
 from physics.collision.distances import sphere_distance
 from physics.compiler.jit import stage
-from physics.granular.coefficients import contact_coefficients, grip_of, shear_loads
+from physics.granular.coefficients import contact_coefficients, shear_loads
 from physics.granular.tables import (
     CENTER,
     CLASS,
@@ -24,6 +24,7 @@ from physics.granular.tables import (
     WEIGHT,
 )
 from physics.model.features import cached_by_features
+from physics.model.tangential import grip_of
 from physics.motion.vectors import cross
 from physics.rotation import rotation_entries
 from physics.spring.coulomb import friction_force, viscous_force
@@ -38,8 +39,8 @@ _BETWEEN, _ARM, _OTHER_ARM, _RELATIVE, _SPIN, _OTHER_SPIN, _SHEAR, _TURN = range
 _RADIUS, _OTHER_RADIUS, _INVERSE, _OTHER_INVERSE, _WEIGHT, _CONTACT = range(25, 31)
 # out: force and torque on the owner, torque on the surface; what a report needs
 _FORCE, _TORQUE, _OTHER_TORQUE, NORMAL, POINT_ARM, PENETRATION = range(38, 54, 3)
-# in: factor on the damping of friction; out: what the contact adds to `SHEAR_LOAD` of both bodies
-_GRIP, _LOAD, _OTHER_LOAD, ROWS = range(PENETRATION + 1, PENETRATION + 5)
+# in: the larger `SHEAR_LOAD` of both bodies; out: what the contact adds to them
+_LARGEST, _LOAD, _OTHER_LOAD, ROWS = range(PENETRATION + 1, PENETRATION + 5)
 FORCE = _FORCE
 
 
@@ -117,7 +118,7 @@ def make_pack(features):
             bx, by, bz = three(motion, b + _SPIN_COLUMN)
             put_three(block, _OTHER_SPIN, n, bx, by, bz)
             if friction:
-                block[_GRIP * BLOCK + n] = grip_of(
+                block[_LARGEST * BLOCK + n] = max(
                     motion[a + _LOAD_COLUMN], motion[b + _LOAD_COLUMN]
                 )
             if history:
@@ -205,8 +206,8 @@ def make_compute(features):
             row.first_compliance, row.second_compliance, inverse, inverse, step,
         )  # fmt: skip
         first, second = row.first_compliance, row.second_compliance
-        load, other_load = shear_loads(
-            shear_k, shear_c, first * inverse, second * inverse, weight, step
+        load, other_load, part = shear_loads(
+            shear_k if history else 0.0, shear_c, first * inverse, second * inverse, weight, step
         )
         for n in range(count):
             if not equal:
@@ -227,8 +228,8 @@ def make_compute(features):
                     other_inverse,
                     step,
                 )
-                load, other_load = shear_loads(
-                    shear_k,
+                load, other_load, part = shear_loads(
+                    shear_k if history else 0.0,
                     shear_c,
                     block[(_CONTACT + 6) * BLOCK + n] * inverse,
                     block[(_CONTACT + 7) * BLOCK + n] * other_inverse,
@@ -285,9 +286,10 @@ def make_compute(features):
                 sz = r20 * tx + r21 * ty + r22 * tz
             reduced = shear_c
             if friction:
-                reduced = block[_GRIP * BLOCK + n] * shear_c
-                block[_LOAD * BLOCK + n] = load
-                block[_OTHER_LOAD * BLOCK + n] = other_load
+                reduced = grip_of(block[_LARGEST * BLOCK + n], part) * shear_c
+                rubs = mu > 0.0
+                block[_LOAD * BLOCK + n] = load if rubs else 0.0
+                block[_OTHER_LOAD * BLOCK + n] = other_load if rubs else 0.0
             fx, fy, fz, sx, sy, sz = law(
                 penetration, nx, ny, nz, ux, uy, uz, k, damping, inverse_mass, shear_k, reduced,
                 mu, h, sx, sy, sz,

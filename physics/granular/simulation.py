@@ -307,10 +307,12 @@ class GranularSimulation(Simulation):
         )  # fmt: skip
         of_owner = row["first_compliance"] * own.dynamic["inverse_mass"][first]
         of_other = row["second_compliance"] * other
-        grip = shear_loads(shear, damping, of_owner, of_other, 1.0, constants.step)
+        spring = shear if self.heap_features.history else 0.0
+        grip = shear_loads(spring, damping, of_owner, of_other, 1.0, constants.step)
         return {
-            "owner_grip": grip[0],
-            "surface_grip": grip[1],
+            "owner_shear_load": grip[0],
+            "surface_shear_load": grip[1],
+            "spring_part": grip[2],
             "stiffness": k,
             "shear_stiffness": shear,
             "damping": float(row["damping"]),

@@ -8,7 +8,7 @@ from typing import Any
 
 from physics.collision.distances import core_distance
 from physics.compiler.jit import LANES, stage
-from physics.granular.coefficients import contact_coefficients, grip_of, shear_loads
+from physics.granular.coefficients import contact_coefficients, shear_loads
 from physics.granular.neighbors import find_old, keep_shear
 from physics.granular.pair_forces import make_law
 from physics.granular.tables import (
@@ -24,6 +24,8 @@ from physics.granular.tables import (
     WEIGHT,
 )
 from physics.model.features import cached_by_features
+from physics.model.tangential import grip_of
+from physics.model.workspace import SHEAR_SUM
 from physics.motion.vectors import cross
 
 
@@ -146,6 +148,7 @@ def make_find_statics(features):
 def make_static_force(features):
     """Formula for the contact of a particle and a static."""
     law, static_distance = make_law(features), make_static_distance(features)
+    history = features.history
 
     @stage
     def static_force(heap, constants, n, s, h, sx, sy, sz):
@@ -170,8 +173,10 @@ def make_static_force(features):
         )  # fmt: skip
         weight, load = motion[body, WEIGHT], motion[body, SHEAR_LOAD]
         compliance = row.first_compliance * motion[body, INVERSE_MASS]
-        adds, _ = shear_loads(shear_k, shear_c, compliance, 0.0, weight, constants.step)
-        shear_c *= grip_of(load, 0.0)
+        spring = shear_k if history else 0.0
+        adds, _, part = shear_loads(spring, shear_c, compliance, 0.0, weight, constants.step)
+        adds = adds if row.friction > 0.0 else 0.0
+        shear_c *= grip_of(load, part)
         fx, fy, fz, sx, sy, sz = law(
             radius - d, nx, ny, nz,
             motion[body, VELOCITY] + px, motion[body, VELOCITY + 1] + py,
@@ -230,7 +235,7 @@ def make_static_forces(features):
                 solid.torque[0, lane] += tx
                 solid.torque[1, lane] += ty
                 solid.torque[2, lane] += tz
-                solid.grip[lane] += adds
+                solid.normals[SHEAR_SUM, lane] += adds
                 if history and h > 0.0:
                     shear[0], shear[1], shear[2] = sx, sy, sz
                     shear[3] = evaluation + 1

@@ -41,7 +41,7 @@ from physics.compiler.jit import LANES, at, stage
 from physics.impulse.moving_arms import slip_of_arms
 from physics.impulse.point_impulses import effective_masses, relative_velocity
 from physics.model.contact_memory import contact_memory
-from physics.model.features import cached_by_features
+from physics.model.features import EULER, cached_by_features
 from physics.motion.vectors import cross, rotated
 from physics.scene.shapes import BOX, CYLINDER, GRID, PLANE
 
@@ -152,7 +152,7 @@ def make_prepare(features):
     That has left the separation of the last step, or inf, in `last_bend`.
     """
     friction, resistance, compound = features.friction, features.resistance, features.compound
-    axial = features.axial
+    axial, halves = features.axial, features.integrator != EULER
     memory_rows = contact_memory(features)
     NORMAL, TANGENT = memory_rows.normal_force, memory_rows.tangential_force
     SHEAR, TWIST, BEND = memory_rows.shear, memory_rows.twist, memory_rows.bend
@@ -225,8 +225,10 @@ def make_prepare(features):
                 point.normal_impact[i] = 0.0
                 gx, gy, gz = normal_impulse * nx, normal_impulse * ny, normal_impulse * nz
                 if friction:
+                    # in a refresh the velocities that follow are h ahead, else half of it
+                    ahead = h if halves & (drifted[i] == 0) else 0.5 * h
                     tx, ty, tz = slip_of_arms(
-                        owner, surface, point, i, h, at(radii, i), axial and turns
+                        owner, surface, point, i, ahead, at(radii, i), axial and turns
                     )
                     tx, ty, tz = flat * tx, flat * ty, flat * tz
                     point.slip_bend[0, i] = tx

@@ -21,11 +21,13 @@ at which the lowest point moves around it. With the direction d to that point an
 
     ((n a) a' - n') e / |n - (n a) a|,    a' = w_1 x a.
 
-On round surfaces the term is left out: it is zero for balls that roll in a plane.
+On balls, capsules, cylinders and tori the term is left out: it is zero for balls that roll in a
+plane. Meshes count as flat.
 """
 
 import math
 
+from physics.collision.facing import BIAS
 from physics.compiler.jit import stage
 from physics.motion.vectors import cross
 
@@ -55,13 +57,15 @@ def rate_around(owner, i, nx, ny, nz, mx, my, mz):
     ex, ey, ez = cross(ax, ay, az, dx, dy, dz)  # as long as d
     px, py, pz = cross(w[0, i], w[1, i], w[2, i], ax, ay, az)
     qx, qy, qz = along * px - mx, along * py - my, along * pz - mz
-    rate = (qx * ex + qy * ey + qz * ez) / max(square, 1e-300)
+    # below the bias the samples keep their angle in the body
+    rate = (qx * ex + qy * ey + qz * ez) / max(square, BIAS * BIAS)
     excess = rate - (w[0, i] * ax + w[1, i] * ay + w[2, i] * az)
+    excess = excess if square > BIAS * BIAS else 0.0
     return excess * ax, excess * ay, excess * az
 
 
 @stage
-def slip_of_arms(owner, surface, point, i, h, radius, axial):
+def slip_of_arms(owner, surface, point, i, ahead, radius, axial):
     """Slip t, x y z in m/s, see above. Zero where a step turns more than a radian.
 
     Args:
@@ -69,7 +73,7 @@ def slip_of_arms(owner, surface, point, i, h, radius, axial):
         surface: likewise.
         point: row of CONTACT_ROW, in the world frame.
         i: lane.
-        h: s.
+        ahead: s, from the present arms to the velocities.
         radius: m, of the owner's samples.
         axial: whether they turn about its axis.
     """
@@ -94,11 +98,10 @@ def slip_of_arms(owner, surface, point, i, h, radius, axial):
     qx, qy, qz = px + (v[0, i] - s[0, i]), py + (v[1, i] - s[1, i]), pz + (v[2, i] - s[2, i])
     px, py, pz = cross(wx, wy, wz, px, py, pz)
     qx, qy, qz = cross(ux, uy, uz, qx, qy, qz)
-    half = 0.5 * h
-    tx, ty, tz = half * (px - qx), half * (py - qy), half * (pz - qz)
+    tx, ty, tz = ahead * (px - qx), ahead * (py - qy), ahead * (pz - qz)
     along = tx * nx + ty * ny + tz * nz
     fastest = max(fx * fx + fy * fy + fz * fz, ux * ux + uy * uy + uz * uz)
     fastest = max(fastest, wx * wx + wy * wy + wz * wz)
-    resolved = h * math.sqrt(fastest) <= 1.0
+    resolved = ahead * math.sqrt(fastest) <= 0.5
     tx, ty, tz = tx - along * nx, ty - along * ny, tz - along * nz
     return tx if resolved else 0.0, ty if resolved else 0.0, tz if resolved else 0.0

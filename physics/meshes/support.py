@@ -128,12 +128,12 @@ class Support:
         for normal, mask, point in zip(
             self.normals, touched, self.inner_points[self.outer], strict=True
         ):
-            if _surrounds(centres[mask], normal):
+            if surrounds(centres[mask], normal):
                 found.append((normal, mask, point))
         return found
 
 
-def _surrounds(points: Array, normal: Array) -> bool:
+def surrounds(points: Array, normal: Array) -> bool:
     """Whether points [n, 3] m in a plane lie around the foot of the origin."""
     across = np.linalg.svd(normal[None])[2][1:]
     places = points @ across.T

@@ -117,6 +117,10 @@ def contact_columns(
         shear_ratios(fidelity, given),
         h,
     )
+    spring = shear_stiffness * (fidelity.friction != "viscous")
+    loads = _shear_loads(spring, shear_damping, shear[:, a], shear[:, b], h)
+    for name in ("owner_shear_load", "surface_shear_load"):
+        loads[name] = loads[name] * (friction > 0.0)
     if fidelity.law == "impulse":
         softest = pair_mass * (SWEEP_RESOLUTION / h) ** 2 * soft
         newton = fidelity.solver == "newton"
@@ -144,18 +148,23 @@ def contact_columns(
         "pair_mass": pair_mass,
         "shear_stiffness": shear_stiffness,
         "shear_damping": shear_damping,
-        **_grips(shear_stiffness, shear_damping, shear[:, a], shear[:, b], h),
+        **loads,
         "friction": friction,
     }
 
 
-def _grips(stiffness: Array, damping: Array, one: Array, two: Array, h: float) -> Columns:
-    """Largest eigenvalues of a step's friction on two bodies with inverse masses `one` and `two`.
+def _shear_loads(spring: Array, damping: Array, one: Array, two: Array, h: float) -> Columns:
+    """Largest eigenvalues of a step's friction on two bodies, see `spring.mass_splitting`.
 
-    See `spring.mass_splitting`; likewise for resistance and inverse moments of inertia.
+    `one` and `two` are their inverse masses. Likewise for resistance and inverse inertia.
     """
-    load, coupling = h * (damping + 0.5 * h * stiffness), np.sqrt(one * two)
-    return {"owner_grip": load * (one + coupling), "surface_grip": load * (two + coupling)}
+    load, coupling = h * (damping + 0.5 * h * spring), np.sqrt(one * two)
+    part = 0.5 * h * spring / np.maximum(damping + 0.5 * h * spring, np.finfo(float).tiny)
+    return {
+        "owner_shear_load": load * (one + coupling),
+        "surface_shear_load": load * (two + coupling),
+        "spring_part": part + 0.0 * one,
+    }
 
 
 def shear_ratios(fidelity: Fidelity, given: Array) -> Array:
@@ -198,14 +207,15 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
 
     twist_stiffness = np.where(turns, twist_stiffness, 1.0)
     twist_damping = np.where(turns, twist_damping, 0.0)
-    resisting = _grips(twist_stiffness, twist_damping, 1.0 / least[:, a], 1.0 / least[:, b], h)
+    one, two = 1.0 / least[:, a], 1.0 / least[:, b]
+    resisting = _shear_loads(twist_stiffness, twist_damping, one, two, h)
     resistance = np.array([
         s.material.rolling_resistance + s.material.spinning_resistance
         for s in solids
     ])  # fmt: skip
     resists = resistance[a] + resistance[b] > 0.0
-    for name, grip in resisting.items():
-        contact[name] = contact[name] + np.where(resists, grip, 0.0)
+    for name in ("owner_shear_load", "surface_shear_load"):
+        contact[name] = contact[name] + np.where(resists, resisting[name], 0.0)
 
     # only the widths of dynamic bodies limit the skin
     widths = np.array([np.inf if isinstance(s, Ground) else s.shape.width for s in solids]) * size
@@ -213,11 +223,14 @@ def half_pair_columns(layout: Layout, p: Parameters) -> Columns:
     reach = np.array([0.0 if isinstance(s, Ground) else s.shape.reach for s in solids]) * size
     owner_reach, surface_reach = reach[:, a], reach[:, b]
     for k, half_pair in enumerate(half_pairs):
-        far = _particle_reach(half_pair.samples)
-        owner_reach[:, k] = np.maximum(owner_reach[:, k], far * size[:, half_pair.owner])
-        if half_pair.partners is not None:
-            far = _particle_reach(half_pair.partners)
-            surface_reach[:, k] = np.maximum(surface_reach[:, k], far * size[:, half_pair.other])
+        if fidelity.geometry == "particle":
+            far = _particle_reach(half_pair.samples)
+            owner_reach[:, k] = np.maximum(owner_reach[:, k], far * size[:, half_pair.owner])
+            if half_pair.partners is not None:
+                far = _particle_reach(half_pair.partners)
+                surface_reach[:, k] = np.maximum(
+                    surface_reach[:, k], far * size[:, half_pair.other]
+                )
         if half_pair.part >= 0:  # about the part's own centre
             part = layout.parts[half_pair.part][1]
             surface_reach[:, k] = part.shape.reach * size[:, half_pair.other]

@@ -34,6 +34,10 @@ Solid = Body | Drive | Static | Ground
 _OFF_CENTRE = 1e-4
 
 
+# in sinks: more than twice the difference of the widths of a ball whose faces lie within a sink
+_ROUND = 4.0
+
+
 class HalfPair(NamedTuple):
     """The samples of solid `owner` against the surface of solid `other`.
 
@@ -183,12 +187,16 @@ def _as_ball(solid: Solid, scene: Scene, fidelity: Fidelity, own_spacing: bool) 
     """
     if isinstance(solid, Ground) or not isinstance(solid.shape, Mesh):
         return solid
-    width = solid.shape.width
+    width, depth = solid.shape.width, sink(fidelity)
+    # what differs more can't be a ball, and samples take time
+    if 2.0 * solid.shape.reach - width > _ROUND * depth:
+        return solid
     apart = fidelity.spacing * width if own_spacing else spacing(solid.shape, scene, fidelity)
     rounding = fidelity.rounding * width / 2.0
-    centres, _, radius, _ = solid.shape.samples(apart, rounding, sink(fidelity))
+    centres, _, radius, _ = solid.shape.samples(apart, rounding, depth)
     central = len(centres) == 1 and np.abs(centres).max() < _OFF_CENTRE * radius
-    if not central:
+    # the ball of one sample is inscribed; less volume than its own means a cavity
+    if not central or solid.shape.volume < Sphere(radius).volume:
         return solid
     if isinstance(solid, Body):  # its mass is known by now
         return replace(solid, shape=Sphere(radius), density=None)

@@ -98,8 +98,9 @@ HALF_PAIR = np.dtype(
         ("shear_damping", "f8"),  # N s/m
         # eigenvalues of a step's friction and resistance if each body touches one solid only, see
         # spring/mass_splitting.py
-        ("owner_grip", "f8"),
-        ("surface_grip", "f8"),
+        ("owner_shear_load", "f8"),
+        ("surface_shear_load", "f8"),
+        ("spring_part", "f8"),  # of these, due to the springs
         ("friction", "f8"),
         ("rolling", "f8"),  # m, rolling resistance
         ("spinning", "f8"),  # m, spinning resistance
@@ -135,8 +136,9 @@ HALF_PAIR_PER_WORLD = (
     "surface_inverse_inertia",
     "shear_stiffness",
     "shear_damping",
-    "owner_grip",
-    "surface_grip",
+    "owner_shear_load",
+    "surface_shear_load",
+    "spring_part",
     "friction",
     "twist_stiffness",
     "twist_damping",

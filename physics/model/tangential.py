@@ -12,6 +12,8 @@ Array = np.ndarray
 # a contact resolution of 0.5 the damping that belongs to it makes a body that pitches between two
 # others unstable: a tower chatters and creeps apart
 SHEAR_RATIO = 1.0 / 3.0
+# eigenvalue of a step at which a mode only changes its sign
+FLIP = 2.0
 
 
 def shear_ratio(resolution: float) -> float:
@@ -53,3 +55,15 @@ def tangential_coefficients(
     rocking = 2.0 * k * pair_mass * (1.0 + rocking_leverage * k / stiffness)
     slow = k * step
     return k, 0.5 * (np.sqrt(4.0 / 3.0 * (slow * slow) + 4.0 * rocking) - slow)
+
+
+@stage
+def grip_of(load: float, spring_part: float) -> float:
+    """Factor on the damping of friction with which a body's load doesn't exceed that of a flip.
+
+    Args:
+        load: of all contacts of a body, see `spring.mass_splitting`.
+        spring_part: the part of a contact's own load that its spring has; its damping has the rest.
+    """
+    whole = FLIP / max(load, FLIP)
+    return max(whole - spring_part, 0.0) / (1.0 - spring_part)

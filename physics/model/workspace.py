@@ -25,8 +25,9 @@ from physics.model.tables import Model
 
 Array = np.ndarray
 
-# rows of `SOLID.normals`
+# rows of `SOLID.normals`, of which the last one is the sum of shear loads
 NORMAL_SUMS = 7
+SHEAR_SUM = NORMAL_SUMS - 1
 
 # one row per solid: dynamic bodies, statics, then compound parts, whose pose and velocity follow
 # their solid's

@@ -253,8 +253,9 @@ class Mesh:
         shell, corners = self.fill == "shell", (self._solid.vertices, self._solid.faces)
         longest = float(np.ptp(self._solid.vertices, axis=0).max())
         if self.particle_count is None:
-            count = math.ceil(longest * self.scale / spacing)  # along it they fill the mesh exactly
-            found = lattice(*corners, longest / max(count, 1))
+            # along the longest side they fill the mesh exactly
+            count = max(math.ceil(longest * self.scale / spacing - 1e-9), 1)
+            found = lattice(*corners, longest / count)
         else:
             found = budgeted(*corners, self._solid.volume, self.particle_count, shell)
         apart, longest = self.scale * found.spacing, self.scale * longest

@@ -185,7 +185,7 @@ def make_begin_half_pair(features):
             mass, spring = at(pair_mass, i), at(stiffness, i)
             # a report, in steps of 0 s, splits nothing: parts may not be written
             part = mass / max(parts[i], 1.0) if splits else mass
-            relative.grip[i] = live.grip[i] if splits and not refresh else 1.0
+            relative.grip[i] = live.grip[i] if splits and refresh != QUERY else 1.0
             rate = part / h if not refresh else 0.0
             relative.inverse_mass[i] = half_pair.crowding / mass
             relative.speed_per_load[i] = 1.0 / math.sqrt(mass * spring)

@@ -24,9 +24,10 @@ circles no mode of a heap overshoots, and friction can't drive it, if for each b
 
     a_i = h (c_i + h k_t,i / 2) (w + sqrt(w w_i))
 
-over its contacts i is at most 2. So where that sum was larger in the last step, the damping of each
-contact is multiplied by its `grip`: 2 over the sum, the smaller one of its two bodies. Cubes and
-balls keep all of it up to two contacts. Without it a heap of rough balls boils for ever.
+over its contacts i is at most 2. So where that sum S was larger in the last step, a contact has the
+part 2/S of its a_i. Its spring keeps all of its own part f, so the damping is multiplied by its
+`grip` (2/S - f)/(1 - f), the smaller one of its two bodies. Cubes and balls keep all of it up to
+two contacts. Without it a heap of rough balls boils for ever.
 
 The damping of the normal law keeps the whole mass. With a part of it, hands that close on a body
 rebound too fast, and a gripper loses its cube (docs/decisions/0007-normal-force.md). The dashpot
@@ -38,16 +39,15 @@ import math
 
 from physics.compiler.jit import LANES, at, stage
 from physics.model.features import ADAPTIVE, RK4
+from physics.model.tangential import grip_of
 from physics.model.workspace import NORMAL_SUMS
 from physics.scene.shapes import PLANE
 
-# eigenvalue of a step at which a mode only changes its sign
-_FLIP = 2.0
-
 
 def splits_mass(features):
-    """Whether masses are split: not where steps of zero length only evaluate forces."""
-    return features.integrator not in (RK4, ADAPTIVE)
+    """Whether masses or damping are split: not where steps of zero length evaluate forces."""
+    splits = not features.dashpot or features.friction or features.viscous
+    return splits and features.integrator not in (RK4, ADAPTIVE)
 
 
 @stage
@@ -84,7 +84,7 @@ def pair_normal(model, workspace, k):
     """
     first = model.half_pair[k]
     owner, normal, loads = first.owner, workspace.half_pair[k].normal, workspace.half_pair[k].loads
-    one, two = first.owner_grip, first.surface_grip
+    one, two = first.owner_shear_load, first.surface_shear_load
     row = 0 if owner < first.surface else 1
     for c in range(3):
         for i in range(LANES):
@@ -139,7 +139,7 @@ def add_normal(solid, normal, load, plane):
 
 
 @stage
-def add_parts(solid, inverse_mass, pair_mass, normal, plane, live):
+def add_parts(solid, inverse_mass, pair_mass, normal, plane, spring_part, live):
     """Adds what a body adds to the parts of a pair: n - 1, weighted by its inverse mass.
 
     Exactly 0 where it touched one solid or none. Also limits the pair's grip, and marks pairs of
@@ -161,7 +161,8 @@ def add_parts(solid, inverse_mass, pair_mass, normal, plane, live):
         more = max(n - 1.0, 0.0) if several else 0.0
         parts[i] += more * at(inverse_mass, i) * at(pair_mass, i)
         supported[i] = 1.0 if solids - own > 0.5 else supported[i]
-        grip[i] = min(grip[i], _FLIP / max(sums[6, i], _FLIP) if several else 1.0)
+        held = grip_of(sums[6, i], at(spring_part, i))
+        grip[i] = min(grip[i], held if several else 1.0)
 
 
 @stage
@@ -186,9 +187,9 @@ def pair_parts(model, workspace, k):
         supported[i] = 0.0
         grip[i] = 1.0
     if owner.partners > 1:
-        add_parts(owner, one, pair_mass, normal, plane, live)
+        add_parts(owner, one, pair_mass, normal, plane, half_pair.spring_part, live)
     if surface.partners > 1:
-        add_parts(surface, two, pair_mass, normal, plane, live)
+        add_parts(surface, two, pair_mass, normal, plane, half_pair.spring_part, live)
     other = half_pair.next_in_pair
     while other != k:
         same = workspace.half_pair[other]

@@ -129,3 +129,12 @@ def test_a_mesh_within_the_sink_of_a_ball_touches_as_that_ball(level: Fidelity, 
     if stress:
         for name, _, value in truths.BALLS:
             assert value(level, mesh) == pytest.approx(value(level, BALL), rel=2e-3), name
+
+
+def test_a_mesh_with_a_cavity_is_no_ball():
+    """A body may be in it."""
+    vertices, faces = meshes.hollow_ball(0.05, 0.035)
+    shell = truths.Body(Mesh(vertices=vertices, faces=faces), mass=truths.MASS)
+    inside = truths.Body(Sphere(0.01), mass=truths.MASS)
+    pairs = Layout.of(Scene([shell, inside]), PRESETS["fast"]).half_pairs
+    assert [pair.surface.mesh is not None for pair in pairs] == [True]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from physics.granular.simulation import GranularSimulation
+from physics.granular.tables import SHEAR_LOAD
 from physics.model import free_memory
 from physics.reference.heaps import heap_scene
 from physics.rotation import rotate
@@ -107,6 +108,14 @@ def test_results_do_not_depend_on_the_threads(friction):
         advance(heap, 400)
     assert len({digest(heap) for heap in heaps}) == 1
     assert heaps[0].penetration()[0] > 0.0
+
+
+def test_friction_forgets_how_many_contacts_bodies_had():
+    heap = simulation(small_heap())
+    advance(heap, 400)
+    assert heap.heaps[0].motion[:, SHEAR_LOAD].max() > 0.1
+    heap.forget(heap.everyone)
+    assert not np.any(heap.heaps[0].motion[:, SHEAR_LOAD])
 
 
 def test_the_refreshed_forces_and_a_report_agree():
