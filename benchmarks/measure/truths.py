@@ -105,7 +105,9 @@ def measure() -> Iterator[Table]:
     ]
     title = "Truths of balls: one of Particles; a mesh of 16,128 faces"
     yield Table("balls", title, ["truth", "right", *levels], rows)
+    engines: dict[str, Engine] = {**levels, **_peer()}
     rows = [
-        [name, right, *(cell(level) for level in levels.values())] for name, right, cell in _loads()
+        [name, right, *(cell(engine) for engine in engines.values())]
+        for name, right, cell in _loads()
     ]
-    yield Table("loads", "Loads on bodies that stand", ["load", "rigid", *levels], rows)
+    yield Table("loads", "Loads on bodies that stand", ["load", "rigid", *engines], rows)

@@ -52,11 +52,14 @@ def made(scene, fidelity=SWEPT, threads=1):
         Body(shape, mass=0.1, position=(FAR, n, height + 0.02), material=material)
         for n, shape in enumerate((Box((0.02, 0.02, 0.02)), Sphere(0.02), Sphere(0.02)))
     ]
-    slab = Static(Box((0.02, 0.02, 0.02)), (FAR, FAR, 0.0), material=material)
+    # flush, as the walls of a box are
+    slabs = [
+        Static(Box((0.02, 0.02, 0.02)), (FAR + x, FAR, 0.0), material=material) for x in (0.0, 0.04)
+    ]
     whole = replace(
         scene,
         bodies=(*scene.bodies, *others),
-        statics=(*scene.statics, slab, *ground),
+        statics=(*scene.statics, *slabs, *ground),
         drives=[GRIPPER],
     )
     # no other test has times of impact among many bodies, so a small kernel will do
