@@ -106,7 +106,7 @@ def make_collide(features):
     Velocities are half a step old; bodies collide with the present ones. What collides is found,
     and what of it still does without the push apart. It is compressed, gets restitution, and gives
     back what that returned too much. These operations follow each other in a loop that calls each
-    stage in one place, because every further call would be compiled anew.
+    stage in one place, because each further call would be compiled again.
     """
     find, book_impacts = make_find(features), make_book_impacts(features)
     change = make_by_colour(features, make_impact_batch(features))

@@ -163,7 +163,7 @@ def _shear_loads(spring: Array, damping: Array, one: Array, two: Array, h: float
     return {
         "owner_shear_load": load * (one + coupling),
         "surface_shear_load": load * (two + coupling),
-        "spring_part": part + 0.0 * one,
+        "spring_part": part,
     }
 
 

@@ -200,7 +200,7 @@ def test_a_heap_of_rough_balls_comes_to_rest(name, stress):
     assert driven.rest_speed(heap) < (0.03 if name == "accurate" else 1e-2)
     if name in ("fast", "balanced"):
         assert heap.largest_stable_step() > heap.fidelity.substep
-        for _ in range(50):  # a wrench makes forces anew, which must not kick the heap either
+        for _ in range(50):  # a wrench makes a refresh, which must not kick the heap either
             heap.apply_wrench(force=np.zeros((1, 160, 3)))
             heap.advance(heap.fidelity.substep)
         assert driven.rest_speed(heap) < 1e-4
