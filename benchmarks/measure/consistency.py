@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.report.tables import Cell, Table
 from physics import PRESETS, Body, Box, Fidelity, Ground, Material, Scene, World
 from physics.reference.scenes import tower
+from physics.scene.fidelity import NEWTON
 from rigid_envs.tasks import TASKS, Task
 
 Array = np.ndarray
@@ -26,7 +27,6 @@ WORLDS, PIECES, FRAME = 64, 50, 0.04
 FINEST = 0.0625e-3  # s
 SOLID = PRESETS["solid"]
 REFERENCES = {"spring": Fidelity(substep=FINEST), "impulse": replace(SOLID, substep=FINEST)}
-NEWTON = replace(SOLID, solver="newton", contact_resolution=50.0)
 SETTINGS: dict[str, Fidelity] = {
     **PRESETS,
     "springs, 0.25 ms": Fidelity(substep=0.25e-3),

@@ -51,11 +51,11 @@ from physics import (
 )
 from physics.model.features import BISECTION, FIXED, GENERAL, ISOTROPIC, MIDPOINT, NO_ROTATION, RK4
 from physics.reference.scenes import tower
+from physics.scene.fidelity import NEWTON
 from physics.step import simulation
 
 SETTLED = 0.25  # s
 SOLID = PRESETS["solid"]
-NEWTON = replace(SOLID, solver="newton", contact_resolution=50.0)
 
 
 def _on(shape: Any, height: float) -> Scene:

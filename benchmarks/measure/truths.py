@@ -6,7 +6,6 @@ ratios unless a unit is given.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -16,8 +15,7 @@ from physics import PRESETS, Fidelity, Mesh, Particles
 from physics.reference import loads, meshes
 from physics.reference.blocks import BLOCKS
 from physics.reference.truths import BALL, BALLS, RADIUS, Engine
-
-NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
+from physics.scene.fidelity import NEWTON
 
 
 def _peer() -> dict[str, Engine]:

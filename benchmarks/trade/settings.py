@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from benchmarks.peers.mujoco_options import MujocoOptions
 from benchmarks.trade.trial import Trial
 from physics import PRESETS, Fidelity
-from physics.scene.fidelity import FIND_IMPACTS
+from physics.scene.fidelity import FIND_IMPACTS, NEWTON
 
 OURS, PEER = "rigid-envs", "MuJoCo"
 # s; each divides the 40 ms between two readings. A trial has those up to its longest one
@@ -57,8 +57,8 @@ _CONTACT_CURVES: dict[str, Fidelity] = {
     "impulses": _IMPULSE,
     "impulses, softer": replace(_IMPULSE, contact_resolution=1.0),
     "impulses, particles": replace(_IMPULSE, geometry="particle"),
-    "impulses, Newton": replace(_IMPULSE, solver="newton", contact_resolution=50.0),
-    "impulses, Newton, stiffer": replace(_IMPULSE, solver="newton", contact_resolution=100.0),
+    "impulses, Newton": NEWTON,
+    "impulses, Newton, stiffer": replace(NEWTON, contact_resolution=100.0),
     "impulses, bisection": replace(_IMPULSE, time_control="bisection"),
     "impulses, advancement": replace(_IMPULSE, time_control="advancement"),
     "impulses, swept": replace(_IMPULSE, time_control="swept"),

@@ -8,7 +8,6 @@ against g h^2, and the lowest ones of a tower sink deep, or even pass through.
 
 import math
 import warnings
-from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from physics.analysis.sinks import rest_depth
 from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import given_stiffness
 from physics.model.tables import Model
-from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.fidelity import NEWTON, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Ground
 
@@ -72,9 +71,8 @@ def _better(scene: Scene, fidelity: Fidelity, depth: float) -> str:
     if given_stiffness(scene):
         return f"materials {depth / DEEP:.2g} times as stiff"
     shorter = f"substep={fidelity.substep * math.sqrt(DEEP / depth):.2g}"
-    newton = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
     try:
-        check_solver(scene, newton, False)
+        check_solver(scene, NEWTON, False)
     except ValueError:
         return shorter
     solves = "law='impulse' with solver='newton' and contact_resolution=50"

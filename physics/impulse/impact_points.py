@@ -75,7 +75,8 @@ def make_find_impacts(features):
 def add_half_impulses(pair, colliding, part, adds):
     """Adds what contacts give up to the present time: a part of their impulses of the last step.
 
-    Only in lanes with a collision, or the others would be rounded. Or it removes them again.
+    Only in lanes with a collision, or the others would be rounded. Or it removes them again, and
+    notes how much of the step is left.
     """
     points = pair.points
     for n in range(points.shape[0]):
@@ -89,6 +90,7 @@ def add_half_impulses(pair, colliding, part, adds):
             half[0, i] = px
             half[1, i] = py
             half[2, i] = pz
+            point.share[i] = 1.0 if adds else 1.0 - given
             apply_impulse(pair, point, i, px, py, pz)
 
 

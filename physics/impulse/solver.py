@@ -52,6 +52,9 @@ def make_warm_start(features):
     `contact_rows` sets `extra_impulse` to the impulses of the last substep with reversed sign.
     Adding the relaxed ones leaves the change that relaxing made; this step's force includes it.
     The friction that a contact kept when it ended is no guess for this step.
+
+    A collision divides a step. Up to it contacts gave what they gave before, be it that they end
+    with it; only what they give in the rest of the step is solved for.
     """
     friction, resistance = features.friction, features.resistance
 
@@ -63,6 +66,7 @@ def make_warm_start(features):
             # `twist`: angular impulse against rolling and spinning
             normal, tangential, twist = point.normal, point.tangential_impulse, point.twist
             extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
+            half = point.half_impulse
             for i in range(LANES):
                 size = point.normal_impulse[i]
                 px, py, pz = size * normal[0, i], size * normal[1, i], size * normal[2, i]
@@ -70,24 +74,33 @@ def make_warm_start(features):
                     px += tangential[0, i]
                     py += tangential[1, i]
                     pz += tangential[2, i]
-                extra[0, i] += px
-                extra[1, i] += py
-                extra[2, i] += pz
-                guess = 1.0 if size > 0.0 else 0.0
+                share = point.share[i]
+                given, guess = 1.0 - share, share if size > 0.0 else 0.0
+                kept, applied = 1.0 + given, guess + given
+                extra[0, i] += kept * px
+                extra[1, i] += kept * py
+                extra[2, i] += kept * pz
+                half[0, i] = given * px
+                half[1, i] = given * py
+                half[2, i] = given * pz
+                point.normal_impulse[i] = share * size
                 if friction:
                     tangential[0, i] *= guess
                     tangential[1, i] *= guess
                     tangential[2, i] *= guess
-                apply_impulse(pair, point, i, guess * px, guess * py, guess * pz)
+                apply_impulse(pair, point, i, applied * px, applied * py, applied * pz)
                 if resistance:
                     tx, ty, tz = twist[0, i], twist[1, i], twist[2, i]
-                    extra_angular[0, i] += tx
-                    extra_angular[1, i] += ty
-                    extra_angular[2, i] += tz
+                    extra_angular[0, i] += kept * tx
+                    extra_angular[1, i] += kept * ty
+                    extra_angular[2, i] += kept * tz
+                    point.half_twist[0, i] = given * tx
+                    point.half_twist[1, i] = given * ty
+                    point.half_twist[2, i] = given * tz
                     twist[0, i] *= guess
                     twist[1, i] *= guess
                     twist[2, i] *= guess
-                    apply_angular_impulse(pair, i, guess * tx, guess * ty, guess * tz)
+                    apply_angular_impulse(pair, i, applied * tx, applied * ty, applied * tz)
 
     return warm_start
 
@@ -121,13 +134,18 @@ def make_store_forces(features):
             normal = point.normal
             tangential, tangential_impact = point.tangential_impulse, point.tangential_impact
             extra, extra_angular = point.extra_impulse, point.extra_angular_impulse
+            half = point.half_impulse
             for i in range(LANES):
                 updates, size = updates_memory[i] != 0, point.normal_impulse[i]
                 fx = extra[0, i] + size * normal[0, i]
                 fy = extra[1, i] + size * normal[1, i]
                 fz = extra[2, i] + size * normal[2, i]
-                normal_force_sum[i] += per_h * (size + point.normal_impact[i])
-                memory[NORMAL, i] = per_h * size if updates else memory[NORMAL, i]
+                # mean forces of the step; if a collision ended the contact, they are its impact
+                hx, hy, hz = half[0, i], half[1, i], half[2, i]
+                along = hx * normal[0, i] + hy * normal[1, i] + hz * normal[2, i]
+                whole, lasts = per_h * (size + along), 1.0 if size > 0.0 else 0.0
+                normal_force_sum[i] += whole + per_h * point.normal_impact[i]
+                memory[NORMAL, i] = lasts * whole if updates else memory[NORMAL, i]
                 exists = row.weight[i] > 0.0  # an empty slot stays empty
                 separation = point.separation[i] if exists else 0.0
                 bend, approach = point.bend[i], point.approach[i]
@@ -135,13 +153,13 @@ def make_store_forces(features):
                 memory[SEPARATION, i] = separation if updates else memory[SEPARATION, i]
                 memory[BEND, i] = bend if updates else memory[BEND, i]
                 memory[APPROACH, i] = approach if updates else memory[APPROACH, i]
-                impact = per_h * point.normal_impact[i]
+                impact, ended = point.normal_impact[i], 1.0 - lasts
                 bx, by, bz = rotated_back(
                     Q,
                     i,
-                    impact * normal[0, i] + per_h * tangential_impact[0, i],
-                    impact * normal[1, i] + per_h * tangential_impact[1, i],
-                    impact * normal[2, i] + per_h * tangential_impact[2, i],
+                    per_h * (impact * normal[0, i] + tangential_impact[0, i] + ended * hx),
+                    per_h * (impact * normal[1, i] + tangential_impact[1, i] + ended * hy),
+                    per_h * (impact * normal[2, i] + tangential_impact[2, i] + ended * hz),
                 )
                 remember(impact_force, 0, i, updates, bx, by, bz)
                 if friction:
@@ -149,6 +167,9 @@ def make_store_forces(features):
                     fx += px
                     fy += py
                     fz += pz
+                    px += lasts * (hx - along * normal[0, i])
+                    py += lasts * (hy - along * normal[1, i])
+                    pz += lasts * (hz - along * normal[2, i])
                     px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
                     remember(memory, TANGENT, i, updates, px, py, pz)
                     anchor = point.anchor  # creep, m
@@ -156,7 +177,10 @@ def make_store_forces(features):
                     remember(memory, SHEAR, i, updates, sx, sy, sz)
                 if resistance:
                     tx, ty, tz = point.twist[0, i], point.twist[1, i], point.twist[2, i]
-                    px, py, pz = rotated_back(Q, i, per_h * tx, per_h * ty, per_h * tz)
+                    px = tx + lasts * point.half_twist[0, i]
+                    py = ty + lasts * point.half_twist[1, i]
+                    pz = tz + lasts * point.half_twist[2, i]
+                    px, py, pz = rotated_back(Q, i, per_h * px, per_h * py, per_h * pz)
                     remember(memory, TWIST, i, updates, px, py, pz)
                     tx = per_h * (tx + extra_angular[0, i])
                     ty = per_h * (ty + extra_angular[1, i])

@@ -40,10 +40,13 @@ _AT_LIMIT = 1e-9
 
 
 @stage
-def soft_response(stiffness, damping, h, weight):
-    """The response a in kg of a soft contact, and the rate in 1/s at which its overlap closes."""
+def soft_response(stiffness, damping, h, part):
+    """The response a in kg of a soft contact, and the rate in 1/s at which its overlap closes.
+
+    `part`: of the pair's stiffness, times that of the step in which the contact acts.
+    """
     rigid = damping + h * stiffness
-    return h * weight * rigid, stiffness / rigid
+    return h * part * rigid, stiffness / rigid
 
 
 @stage
@@ -113,7 +116,8 @@ def make_sweep(features):
             point = points[n]
             for i in range(LANES):
                 mu = at(frictions, i)
-                a, rate = soft_response(at(stiffness, i), at(damping, i), h, point.weight[i])
+                part = point.weight[i] * point.share[i]
+                a, rate = soft_response(at(stiffness, i), at(damping, i), h, part)
                 nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 separation, weight = point.separation[i], point.weight[i]
                 m, before = point.mass[i], point.normal_impulse[i]

@@ -91,7 +91,7 @@ def begin_operation(workspace, crowd, pairs, b, operation, value, stamp):
         involved = True
         if operation in (REMOVE_PUSH_OUT, SWEEP):
             involved = is_stirred(crowd, pairs, b, i, stamp)
-        elif operation != ADD_HALVES and operation != REMOVE_HALVES:
+        elif operation != ADD_HALVES:
             involved = pairs.colliding[b, i] != 0
         lane.unconverged[i] = 1 if involved else 0
         lane.largest_change[i] = 0.0
@@ -100,7 +100,8 @@ def begin_operation(workspace, crowd, pairs, b, operation, value, stamp):
         lane.end_work[i] = 0.0
         lane.restitution_scale[i] = value
         some += lane.unconverged[i]
-    return some
+    # all give back what they got to look ahead; what hasn't collided keeps a whole step
+    return LANES if operation == REMOVE_HALVES else some
 
 
 @stage
@@ -136,7 +137,8 @@ def make_impact_batch(features):
         With SWEEP a change of round-off doesn't count.
 
         `value`: with SWEEP the fastest approach in m/s, with SCALE the fraction of the impulses
-        that is left, with ADD_HALVES the part of the last impulses; `extremes`: of the thread.
+        that is left, with ADD_HALVES and REMOVE_HALVES the part of the last impulses; `extremes`:
+        of the thread.
         """
         if begin_operation(workspace, crowd, pairs, b, operation, value, stamp) == 0:
             return 0

@@ -145,7 +145,7 @@ def make_collide(features):
                 else:
                     operation = last
                 continue
-            options = (operation, value, stamp, mine)
+            options = (operation, part if operation == REMOVE_HALVES else value, stamp, mine)
             mine[CHANGED] = change(model, workspace, rows, crowd, pairs, team, options)
             if operation in (SWEEP, RESTITUTE, SCALE):
                 stamp += 1

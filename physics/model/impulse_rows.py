@@ -40,6 +40,8 @@ CONTACT_ROW = np.dtype(
         ("arrives", "f8", (LANES,)),
         ("mass", "f8", (LANES,)),  # kg, effective mass along the normal
         ("shear_mass", "f8", (LANES,)),  # kg, smallest effective mass across it
+        # part of the step over which its impulses act: 1; after a collision what is left of it
+        ("share", "f8", (LANES,)),
         ("normal_impulse", "f8", (LANES,)),  # N s
         ("tangential_impulse", "f8", (3, LANES)),  # N s
         ("twist", "f8", (3, LANES)),  # N m s against rolling and spinning
@@ -54,7 +56,9 @@ CONTACT_ROW = np.dtype(
         ("impact_target", "f8", (LANES,)),  # m/s, separation rate that compression ends with
         ("normal_impact", "f8", (LANES,)),  # N s
         ("tangential_impact", "f8", (3, LANES)),  # N s
-        ("half_impulse", "f8", (3, LANES)),  # N s, of the half step before a collision
+        # of the part of the step before a collision
+        ("half_impulse", "f8", (3, LANES)),  # N s
+        ("half_twist", "f8", (3, LANES)),  # N m s
         # of compression alone, and the least normal impulse after restitution
         ("compression", "f8", (LANES,)),  # N s
         ("tangential_compression", "f8", (3, LANES)),  # N s

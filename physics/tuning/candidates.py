@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from physics.scene.drives import Drive
-from physics.scene.fidelity import FIND_IMPACTS, PRESETS, Fidelity
+from physics.scene.fidelity import FIND_IMPACTS, NEWTON, PRESETS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground, touch_each_other
 from physics.tuning.motion import FRAME
@@ -87,7 +87,7 @@ def families(scene: Scene) -> Iterator[Family]:
             "impulses, spacing 1": replace(impulse, spacing=1.0),
             "impulses, 1 rad per step": replace(impulse, contact_resolution=1.0),
             "impulses, swept": replace(impulse, time_control="swept"),
-            "impulses, Newton": replace(impulse, solver="newton", contact_resolution=50.0),
+            "impulses, Newton": NEWTON,
         }
     else:
         bases = {

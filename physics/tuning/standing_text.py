@@ -5,7 +5,6 @@ The derivation is in `analysis.standing`.
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from physics.manybody.simulation import is_crowd
 from physics.model.rocking import outward_sides
 from physics.model.tables import Model
 from physics.rotation import rotate_back
-from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.fidelity import NEWTON, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.shapes import Samples
 from physics.tuning.description import code
@@ -92,9 +91,8 @@ def _better(scene: Scene, fidelity: Fidelity, loss: float) -> str:
     if given_stiffness(scene):  # the loss is proportional to 1 / sqrt(stiffness)
         return f"materials {(loss / _LOSS) ** 2:.2g} times as stiff"
     shorter = f"substep={fidelity.substep * _LOSS / loss:.2g}"
-    newton = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
     try:
-        check_solver(scene, newton, is_crowd(scene, newton, False))
+        check_solver(scene, NEWTON, is_crowd(scene, NEWTON, False))
     except ValueError:
         return shorter
-    return f"{shorter}, or {code(newton)}"
+    return f"{shorter}, or {code(NEWTON)}"

@@ -24,8 +24,8 @@ from physics import (
     World,
 )
 from physics.reference import classics, driven
+from physics.scene.fidelity import NEWTON
 
-NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 LEVELS = {**PRESETS, "newton": NEWTON}
 QUICK = ("balanced", "solid")
 

@@ -24,9 +24,9 @@ from physics.reference.loads import (
     pulled,
     tipping_slope,
 )
+from physics.scene.fidelity import NEWTON
 from physics.scene.shapes import Samples
 
-NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 LEVELS = {**PRESETS, "newton": NEWTON}
 SPRINGS = ("fast", "balanced", "accurate")
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from physics import PRESETS, Body, Box, Ground, Material, Scene, Sphere, Static, World
+from physics.scene.fidelity import NEWTON
 
 LEVELS = {
     **PRESETS,
-    "newton": replace(PRESETS["solid"], solver="newton", contact_resolution=50.0),
+    "newton": NEWTON,
 }
 CUBE = Box((0.02, 0.02, 0.02))
 ROUGH = Material(0.3, 0.5)

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from physics import PRESETS, Body, Box, Drive, Fidelity, Ground, Material, Scene, Sphere, World
+from physics import PRESETS, Body, Box, Drive, Ground, Material, Scene, Sphere, World
 from physics.reference.scenes import tower
-
-NEWTON = Fidelity(law="impulse", solver="newton", contact_resolution=50.0)
+from physics.scene.fidelity import NEWTON
 
 
 def loaded(ratio, width=0.04, more=()):

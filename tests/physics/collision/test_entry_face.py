@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from physics import Body, Box, Compound, Cylinder, Fidelity, Ground, Scene, Sphere, World
-from physics.scene.fidelity import PRESETS
+from physics import Body, Box, Compound, Cylinder, Ground, Scene, Sphere, World
+from physics.scene.fidelity import NEWTON, PRESETS
 
-NEWTON = Fidelity(law="impulse", solver="newton", contact_resolution=50)
 FIDELITIES = {**PRESETS, "newton": NEWTON}
 LEVELS = pytest.mark.parametrize("level", FIDELITIES)
 HALF = 0.02  # m, half width of a cube

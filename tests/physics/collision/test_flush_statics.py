@@ -11,7 +11,6 @@ from physics import (
     Capsule,
     Compound,
     Cylinder,
-    Fidelity,
     Ground,
     Material,
     Scene,
@@ -19,10 +18,9 @@ from physics import (
     Static,
     World,
 )
-from physics.scene.fidelity import PRESETS
+from physics.scene.fidelity import NEWTON, PRESETS
 from physics.scene.flush_statics import FlushBox, join_flush
 
-NEWTON = Fidelity(law="impulse", solver="newton", contact_resolution=50)
 FIDELITIES = {**PRESETS, "newton": NEWTON}
 SMOOTH = Material(friction=0.0)
 CUBE = Box((0.02, 0.02, 0.02))

@@ -112,6 +112,30 @@ def test_the_force_reported_is_that_which_the_momentum_shows():
     np.testing.assert_allclose(given, (0, 0, 2.0 * mass), atol=1e-12)
 
 
+def test_an_edge_that_an_impact_of_the_other_edge_lifts_has_pressed_up_to_it():
+    """In one world of many bodies as in others; what relaxing takes back isn't reported."""
+    rough = Material(1.0)
+    block = Body(
+        Box((0.015, 0.015, 0.06)), mass=0.1, position=(-0.00738, 0, 0.06132), material=rough,
+        orientation=(0, math.sin(0.06), 0, math.cos(0.06)),
+    )  # fmt: skip
+    balls = [Body(Sphere(0.02), mass=0.1, position=(1 + n, 0, 100)) for n in range(40)]
+    paths = []
+    for others in ([], balls):
+        world = World(Scene([block, *others], [Ground(material=rough)]), "solid")
+        given, spins = 0.5 * STEP * world.contacts().force.sum(axis=0), []
+        for _ in range(300):
+            world.advance(STEP)
+            pressed = world.contacts().force.sum(axis=0)
+            given += STEP * pressed
+            spins.append(world.angular_velocity[0, 0, 1])
+        moved = 0.1 * world.linear_velocity[0, 0] + (0, 0, 0.1 * GRAVITY * world.time[0])
+        np.testing.assert_allclose(given - 0.5 * STEP * pressed, moved, atol=0.02)
+        paths.append(spins)
+    assert (np.diff(np.sign(paths[0])) != 0).sum() > 1  # it has rocked
+    np.testing.assert_allclose(paths[1], paths[0], atol=1e-3)
+
+
 @pytest.mark.parametrize("speed", [1.0, 5.0, 20.0])
 def test_a_body_is_met_at_most_half_a_step_late(speed):
     """Whatever the skin: what is met so soon is looked for."""

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from physics import PRESETS, Body, Box, Fidelity, Ground, Hinge, Material, Scene, World
+from physics import Body, Box, Fidelity, Ground, Hinge, Material, Scene, World
 from physics.compiler.jit import LANES
 from physics.impulse import blocks
 from physics.model.impulse_rows import BLOCK, BLOCK_VECTOR
 from physics.reference import scenes
 from physics.reference.measures import energy_gain, grazing
 from physics.reference.scenes import GRAVITY, settled
+from physics.scene.fidelity import NEWTON
 
-NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 LONG = replace(NEWTON, substep=0.02)
 MASS, WIDTH = 0.064, 0.04  # of a tower's cube
 

@@ -26,7 +26,7 @@ from physics import (
 from physics.model.build import build
 from physics.model.features import general
 from physics.reference import meshes
-from physics.scene.fidelity import PRESETS
+from physics.scene.fidelity import NEWTON, PRESETS
 from physics.step import kernel_choice
 from rigid_envs.episodes import runner
 from rigid_envs.tasks import Push
@@ -106,7 +106,7 @@ FIDELITIES = {
     "adaptive": Fidelity(integrator="adaptive"),
     "halved": Fidelity(time_control="adaptive"),
     "swept": Fidelity(law="impulse", contact_resolution=1.8, time_control="swept"),
-    "newton": Fidelity(law="impulse", contact_resolution=50.0, solver="newton"),
+    "newton": NEWTON,
 }
 # of these tests that run by default; the others are those of make stress
 QUICK = {("hand", "balanced"), ("slabs", "solid"), ("attractor", "adaptive")}

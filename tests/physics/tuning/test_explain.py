@@ -6,6 +6,7 @@ import pytest
 
 from physics import PRESETS, Attractor, Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
 from physics.reference.scenes import block_on_ground, tower
+from physics.scene.fidelity import NEWTON
 from physics.tuning.motion import Course, simulate
 
 CUBE = block_on_ground(mass=0.1)
@@ -56,11 +57,10 @@ def test_it_says_when_a_world_would_refuse():
 
 def test_the_refusal_is_that_of_a_world_whatever_refuses_it():
     stiff = Material(0.5, 0.0, stiffness=3e4)
-    newton = Fidelity(law="impulse", solver="newton", contact_resolution=50.0)
     balls = Scene([Body(Sphere(0.02), mass=0.1, material=stiff, position=(0, 0, 0.02 + 0.05 * i))
                    for i in range(20)], [Ground(stiff)])  # fmt: skip
     for scene, fidelity in (
-        (CUBE, Fidelity(integrator="adaptive")), (tower(40), newton), (balls, Fidelity()),
+        (CUBE, Fidelity(integrator="adaptive")), (tower(40), NEWTON), (balls, Fidelity()),
     ):  # fmt: skip
         with pytest.raises(ValueError) as error:  # noqa: PT011
             World(scene, fidelity)
