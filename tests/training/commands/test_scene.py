@@ -1,6 +1,8 @@
 """Scenes of many bodies from the command line."""
 
+import math
 import re
+from dataclasses import replace
 
 import imageio.v2 as imageio
 import numpy as np
@@ -101,3 +103,23 @@ def test_a_video_that_is_too_large_is_refused(capsys, tmp_path):
     assert main([*words, "--size", "5000"]) == 2
     assert "--size is 5000, should be 16 to 4096 pixels" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_all_dominoes_fall_and_the_wave_has_the_speed_of_half_the_step():
+    scene, fidelity = SCENES["dominoes"](60, 0)
+    speeds = []
+    for level in (fidelity, replace(fidelity, substep=0.5 * fidelity.substep)):
+        world = World(scene, level)
+        world.advance(1.5)
+        tilted = np.array([up_of(world, body) for body in range(60)])
+        assert tilted.max() < math.cos(math.radians(30.0))
+        touched = [float(world.first_touch(n, n + 1)[0]) for n in (20, 50)]
+        speeds.append(30 * 0.02 / (touched[1] - touched[0]))
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.03)
+    assert 0.95 < speeds[1] < 1.05  # m/s
+
+
+def up_of(world, body):
+    """Cosine of the angle by which a body is tilted."""
+    x, y = world.orientation[0, body, :2]
+    return 1.0 - 2.0 * (x * x + y * y)
