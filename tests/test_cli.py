@@ -168,7 +168,7 @@ def test_missing_packages_name_the_extra(capsys, monkeypatch):
     assert cli.main(["scripted"]) == 2
     assert capsys.readouterr().err == (
         "error: this command requires no_such_package; "
-        'to install, in a clone: pip install -c constraints.txt ".[train]"\n'
+        'to install, in a clone: pip install -c constraints.txt -e ".[train]"\n'
     )
 
 

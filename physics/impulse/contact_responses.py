@@ -54,8 +54,8 @@ def make_set_responses(features):
                 p = point.normal_impulse[i]
                 ux, uy, uz = relative_velocity(owner, surface, point, i)
                 un = ux * nx + uy * ny + uz * nz
-                part = weight * point.share[i]
-                a, rate = soft_response(at(stiffness, i), at(damping, i), h, part)
+                acting = weight * point.remaining[i]
+                a, rate = soft_response(at(stiffness, i), at(damping, i), h, acting)
                 rises = un + point.bend[i]
                 approach = rises + target_approach(separation, rate, 1.0 / h)
                 solved = (weight > 0.0) & (point.arrives[i] == 0.0)

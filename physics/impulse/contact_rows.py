@@ -220,7 +220,7 @@ def make_prepare(features):
                 point.rest_speed[i] = per_h * (-un - memory[APPROACH, i]) if known else -along
                 point.approach[i] = -un
                 point.relaxed[i] = 0.0
-                point.share[i] = 1.0
+                point.remaining[i] = 1.0
                 normal_impulse = h * memory[NORMAL, i]
                 point.normal_impulse[i] = normal_impulse
                 point.normal_impact[i] = 0.0

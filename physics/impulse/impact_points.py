@@ -90,7 +90,7 @@ def add_half_impulses(pair, colliding, part, adds):
             half[0, i] = px
             half[1, i] = py
             half[2, i] = pz
-            point.share[i] = 1.0 if adds else 1.0 - given
+            point.remaining[i] = 1.0 - given
             apply_impulse(pair, point, i, px, py, pz)
 
 

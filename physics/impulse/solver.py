@@ -53,8 +53,8 @@ def make_warm_start(features):
     Adding the relaxed ones leaves the change that relaxing made; this step's force includes it.
     The friction that a contact kept when it ended is no guess for this step.
 
-    A collision divides a step. Up to it contacts gave what they gave before, be it that they end
-    with it; only what they give in the rest of the step is solved for.
+    A collision halves a step. Up to it contacts gave what they gave before, even if they end with
+    it; only what they give in the rest of the step is solved for.
     """
     friction, resistance = features.friction, features.resistance
 
@@ -74,21 +74,22 @@ def make_warm_start(features):
                     px += tangential[0, i]
                     py += tangential[1, i]
                     pz += tangential[2, i]
-                share = point.share[i]
-                given, guess = 1.0 - share, share if size > 0.0 else 0.0
-                kept, applied = 1.0 + given, guess + given
+                presses = 1.0 if size > 0.0 else 0.0
+                guess = presses * point.remaining[i]
+                given = presses - guess
+                kept = 1.0 + given
                 extra[0, i] += kept * px
                 extra[1, i] += kept * py
                 extra[2, i] += kept * pz
                 half[0, i] = given * px
                 half[1, i] = given * py
                 half[2, i] = given * pz
-                point.normal_impulse[i] = share * size
+                point.normal_impulse[i] = guess * size
                 if friction:
                     tangential[0, i] *= guess
                     tangential[1, i] *= guess
                     tangential[2, i] *= guess
-                apply_impulse(pair, point, i, applied * px, applied * py, applied * pz)
+                apply_impulse(pair, point, i, presses * px, presses * py, presses * pz)
                 if resistance:
                     tx, ty, tz = twist[0, i], twist[1, i], twist[2, i]
                     extra_angular[0, i] += kept * tx
@@ -100,7 +101,7 @@ def make_warm_start(features):
                     twist[0, i] *= guess
                     twist[1, i] *= guess
                     twist[2, i] *= guess
-                    apply_angular_impulse(pair, i, applied * tx, applied * ty, applied * tz)
+                    apply_angular_impulse(pair, i, presses * tx, presses * ty, presses * tz)
 
     return warm_start
 
@@ -140,7 +141,8 @@ def make_store_forces(features):
                 fx = extra[0, i] + size * normal[0, i]
                 fy = extra[1, i] + size * normal[1, i]
                 fz = extra[2, i] + size * normal[2, i]
-                # mean forces of the step; if a collision ended the contact, they are its impact
+                # Memory holds mean forces of the step. A contact that a collision ended keeps
+                # none: what it gave before counts as impact
                 hx, hy, hz = half[0, i], half[1, i], half[2, i]
                 along = hx * normal[0, i] + hy * normal[1, i] + hz * normal[2, i]
                 whole, lasts = per_h * (size + along), 1.0 if size > 0.0 else 0.0

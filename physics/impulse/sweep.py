@@ -40,13 +40,13 @@ _AT_LIMIT = 1e-9
 
 
 @stage
-def soft_response(stiffness, damping, h, part):
+def soft_response(stiffness, damping, h, weight):
     """The response a in kg of a soft contact, and the rate in 1/s at which its overlap closes.
 
-    `part`: of the pair's stiffness, times that of the step in which the contact acts.
+    `weight`: of the point, times the part of the step that remains.
     """
     rigid = damping + h * stiffness
-    return h * part * rigid, stiffness / rigid
+    return h * weight * rigid, stiffness / rigid
 
 
 @stage
@@ -116,10 +116,10 @@ def make_sweep(features):
             point = points[n]
             for i in range(LANES):
                 mu = at(frictions, i)
-                part = point.weight[i] * point.share[i]
-                a, rate = soft_response(at(stiffness, i), at(damping, i), h, part)
-                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 separation, weight = point.separation[i], point.weight[i]
+                acting = weight * point.remaining[i]
+                a, rate = soft_response(at(stiffness, i), at(damping, i), h, acting)
+                nx, ny, nz = point.normal[0, i], point.normal[1, i], point.normal[2, i]
                 m, before = point.mass[i], point.normal_impulse[i]
                 ux, uy, uz = relative_velocity(owner, surface, point, i)
                 un = ux * nx + uy * ny + uz * nz  # then with curvature: the separation rate

@@ -100,8 +100,7 @@ def begin_operation(workspace, crowd, pairs, b, operation, value, stamp):
         lane.end_work[i] = 0.0
         lane.restitution_scale[i] = value
         some += lane.unconverged[i]
-    # all give back what they got to look ahead; what hasn't collided keeps a whole step
-    return LANES if operation == REMOVE_HALVES else some
+    return some
 
 
 @stage
@@ -140,7 +139,8 @@ def make_impact_batch(features):
         that is left, with ADD_HALVES and REMOVE_HALVES the part of the last impulses; `extremes`:
         of the thread.
         """
-        if begin_operation(workspace, crowd, pairs, b, operation, value, stamp) == 0:
+        involved = begin_operation(workspace, crowd, pairs, b, operation, value, stamp)
+        if involved == 0 and operation != REMOVE_HALVES:  # that undoes what all have got
             return 0
         tables, arrays = batch_of(all_model, workspace, rows, crowd, pairs, b)
         model, mine, lane = bundle(tables), bundle(arrays), workspace.lane[0]

@@ -17,7 +17,7 @@ def convex_hull(vertices: Array) -> tuple[Array, Array]:
     except ImportError:
         raise ImportError(
             "Mesh(convex_hull=True) needs scipy; to install, in a clone: "
-            "pip install -c constraints.txt '.[mesh]'"
+            "pip install -c constraints.txt -e '.[mesh]'"
         ) from None
     try:
         found = ConvexHull(vertices)

@@ -25,7 +25,7 @@ def read_mesh(source: Any) -> tuple[Array, Array]:
     except ImportError:
         raise ImportError(
             "Mesh(path or trimesh.Trimesh) needs trimesh; to install, in a clone: "
-            "pip install -c constraints.txt '.[mesh]'. "
+            "pip install -c constraints.txt -e '.[mesh]'. "
             "Mesh(vertices=..., faces=...) needs only numpy"
         ) from None
     if isinstance(source, trimesh.Trimesh):

@@ -40,13 +40,13 @@ CONTACT_ROW = np.dtype(
         ("arrives", "f8", (LANES,)),
         ("mass", "f8", (LANES,)),  # kg, effective mass along the normal
         ("shear_mass", "f8", (LANES,)),  # kg, smallest effective mass across it
-        # part of the step over which its impulses act: 1; after a collision what is left of it
-        ("share", "f8", (LANES,)),
+        # part of the step in which its impulses act: 1; after a collision what remains of it
+        ("remaining", "f8", (LANES,)),
         ("normal_impulse", "f8", (LANES,)),  # N s
         ("tangential_impulse", "f8", (3, LANES)),  # N s
         ("twist", "f8", (3, LANES)),  # N m s against rolling and spinning
-        # given in this step beyond the impulses above: by the relaxation sweep, and in a refresh
-        # by collisions
+        # given in this step beyond the impulses above: by the relaxation sweep, before a collision,
+        # and in a refresh by collisions
         ("extra_impulse", "f8", (3, LANES)),  # N s
         ("extra_angular_impulse", "f8", (3, LANES)),  # N m s
         ("anchor", "f8", (3, LANES)),  # m, creep since the point came to stick

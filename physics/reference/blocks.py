@@ -82,13 +82,15 @@ def _slid(
 def rocking(level: Level, count: int = 24) -> Array:
     """[count] angular velocity after over before the impact of a block that rocks, e = 0, mu = 1.
 
-    It is let go at half to 0.6 of the angle at which it would tip. Right: `ROCKING`, by the angular
-    momentum about the edge that is hit (Housner 1963). The speeds follow from the largest angles.
+    It is let go at half to 0.6 of the angle at which it would tip, so that it hits at any phase of
+    a step. Right: `ROCKING`, by the angular momentum about the edge that is hit (Housner 1963). The
+    speeds follow from the largest angles.
     """
     rounding = resolve(level).rounding * BLOCK[0]
     wide, high = BLOCK[0] - rounding, BLOCK[1] - rounding  # of the core
     tip = math.atan2(wide, high)
-    start = np.linspace(0.5, 0.6, count) * tip
+    # spread evenly, whatever the count, by the golden ratio
+    start = (0.5 + 0.1 * np.mod(np.arange(count) * 0.5 * (math.sqrt(5.0) - 1.0), 1.0)) * tip
     block = Body(Box((BLOCK[0], *BLOCK)), mass=MASS, material=Material(1.0))
     world = World(Scene([block], [Ground(material=Material(1.0))]), level, count)
     position, orientation = np.zeros((count, 1, 3)), np.zeros((count, 1, 4))

@@ -106,6 +106,8 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         """Checks every field."""
+        if self.law in ("fast", "balanced", "accurate", "solid"):
+            raise ValueError(f"{self.law!r} is a preset: physics.PRESETS[{self.law!r}]")
         choice("Fidelity.law", self.law, LAWS)
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
         choice("Fidelity.damping", self.damping, DAMPINGS)
@@ -214,7 +216,7 @@ PRESETS: dict[str, Fidelity] = {
     "accurate": Fidelity(substep=0.25e-3, contact_resolution=0.2, spacing=0.25),
     "solid": Fidelity(law="impulse", contact_resolution=1.8),
 }
-# what stands and carries: all contacts of a world at once, so stiff that it sinks by micrometres
+# all contacts of a world at once, so stiff that next to nothing sinks: for what stands and carries
 NEWTON = replace(PRESETS["solid"], solver="newton", contact_resolution=50.0)
 
 

@@ -18,7 +18,8 @@ from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features, general
 from physics.model.tables import Model
 from physics.scene.drives import Drive
-from physics.scene.fidelity import PRESETS, Fidelity
+from physics.scene.fidelity import NEWTON, PRESETS, Fidelity
+from physics.scene.mesh import Mesh
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground
 from physics.tuning.candidates import can_touch, safe_speed
@@ -32,7 +33,7 @@ Array = np.ndarray
 
 _TURN = 0.6  # rad in a substep, by which a jointed body may turn, see docs/joints.md
 # contact resolutions of impulses at which stacks stand, see docs/physics.md
-_STIFF, _NEWTON = PRESETS["solid"].contact_resolution, 50.0
+_STIFF, _NEWTON = PRESETS["solid"].contact_resolution, NEWTON.contact_resolution
 _KINDS = 6  # different bodies that are listed
 _PAIRS = 12  # different contacts that are listed
 
@@ -54,7 +55,12 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
         scene: the scene.
         fidelity: the fidelity.
         costs: measure costs, which takes a second, and up to a minute where kernels are compiled.
+
+    Raises:
+        TypeError: the scene is none.
     """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene must be Scene, got {scene!r}")
     few = _kinds(scene)
     model, features = build(few, fidelity)
     lines = [code(fidelity), f"kernel: {_kernel(features)}", "", "Models"]
@@ -62,7 +68,7 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     lines += ["", "Leaves out"]
     lines += [f"  {line}" for line in _left_out(scene, fidelity, features)] or ["  nothing"]
     lines += ["", "Steps"]
-    refused = _refusal(scene, fidelity)
+    refused, warned = _verdict(scene, fidelity)
     if refused:
         lines.append(f"  a World refuses it: {refused}")
     else:
@@ -70,6 +76,7 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
     if len(model.half_pair):
         lines += ["", "Contacts"]
         lines += [f"  {line}" for line in _contacts(few, fidelity, model)]
+        lines += [f"  a World warns: {warned}"] if warned else []
         kinds = [_kind(solid) for solid in (*few.bodies, *few.driven_bodies, *few.statics)]
         stands = [f"  {line}" for line in standing(few, fidelity, model, kinds)]
         lines += ["", "Standing", *stands] if stands else []
@@ -187,6 +194,11 @@ def _left_out(scene: Scene, fidelity: Fidelity, features: Features) -> Iterator[
         )
     if touching and fidelity.geometry == "shape":
         yield f"sharp edges: boxes are rounded by {100 * fidelity.rounding:.3g} % of a half width"
+        if any(isinstance(body.shape, Mesh) for body in scene.bodies):
+            yield (
+                "sharp edges of meshes: rounded by 1.5 Mesh.cells or more, so that slim ones tip "
+                "early; more cells round less"
+            )
     if not scene.drives and not scene.joints and not scene.fields:
         yield "drives, joints, fields: there are none"
 
@@ -233,15 +245,15 @@ def _largest_step(scene: Scene, few: Scene, fidelity: Fidelity) -> tuple[float, 
     return min(found, default=(math.inf, ""))
 
 
-def _refusal(scene: Scene, fidelity: Fidelity) -> str:
-    """Why a World refuses a fidelity; "" if it doesn't."""
+def _verdict(scene: Scene, fidelity: Fidelity) -> tuple[str, str]:
+    """Why a World refuses a fidelity, and of which sink it warns; "" if it doesn't."""
     try:
-        with warnings.catch_warnings():  # the sinks are listed
-            warnings.simplefilter("ignore", SoftSupport)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SoftSupport)
             World(scene, fidelity)
     except ValueError as error:
-        return str(error)
-    return ""
+        return str(error), ""
+    return "", next((str(one.message) for one in caught if one.category is SoftSupport), "")
 
 
 def _contacts(scene: Scene, fidelity: Fidelity, model: Model) -> Iterator[str]:

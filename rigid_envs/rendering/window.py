@@ -39,7 +39,7 @@ def load_pygame() -> Any:
     except ImportError as error:
         raise DependencyNotInstalled(
             "a window needs pygame; to install, in a clone: "
-            'pip install -c constraints.txt ".[render]"'
+            'pip install -c constraints.txt -e ".[render]"'
         ) from error
     return pygame
 

@@ -151,7 +151,7 @@ def test_explain_says_where_a_body_that_stands_tips_and_what_would_be_better():
     line = re.search(r"tips at 18\.4°.*here at ([\d.]+)°.*from ([\d.]+)°", text)
     assert float(line[1]) == pytest.approx(math.degrees(predicted.gradual), abs=0.05)
     assert float(line[2]) == pytest.approx(math.degrees(predicted.sudden), abs=0.05)
-    better = re.search(r"to lose at most 5 % of that angle: substep=([\d.]+), or (.*)", text)
+    better = re.search(r"at most 5 % of that angle by sinking: substep=([\d.]+), or (.*)", text)
     lost = predicted_tipping(replace(PRESETS["fast"], substep=float(better[1])))
     assert 1.0 - lost.sudden / lost.rigid == pytest.approx(0.05, rel=0.1)
     assert eval(better[2]) == Fidelity(law="impulse", contact_resolution=50.0, solver="newton")

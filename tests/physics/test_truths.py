@@ -98,15 +98,15 @@ def test_a_ball_that_falls_from_ten_metres_keeps_its_energy_in_ten_bounces(level
 @pytest.mark.parametrize("level", ["solid", NEWTON], ids=["solid", "newton"])
 def test_a_rocking_block_keeps_its_angular_momentum_about_the_edge_that_it_hits(level):
     """In the mean: at 2 ms the impact comes up to half a step early or late."""
-    assert blocks.rocking(level).mean() == pytest.approx(blocks.ROCKING, rel=0.02)
+    assert blocks.rocking(level).mean() == pytest.approx(blocks.ROCKING, rel=0.015)
 
 
 def test_springs_rock_a_slim_block_right_at_the_substep_that_explain_names():
-    """Edges sink: `fast` loses 11 % too much, `balanced` 9 %."""
+    """Edges sink: `balanced` loses 9 % too much."""
     assert blocks.rocking("balanced").mean() < 0.95 * blocks.ROCKING
     block = truths.Body(Box((blocks.BLOCK[0], *blocks.BLOCK)), mass=truths.MASS)
     text = PRESETS["balanced"].explain(Scene([block], [Ground()]), costs=False)
-    substep = re.search("to lose at most 5 % of that angle: substep=([0-9.e-]+)", text)[1]
+    substep = re.search("at most 5 % of that angle by sinking: substep=([0-9.e-]+)", text)[1]
     better = replace(PRESETS["balanced"], substep=float(substep))
     assert blocks.rocking(better).mean() == pytest.approx(blocks.ROCKING, rel=0.02)
 

@@ -32,7 +32,7 @@ def require(extra: str, modules: Sequence[str]) -> None:
     """
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if missing:
-        how = f'pip install -c constraints.txt ".[{extra}]"'
+        how = f'pip install -c constraints.txt -e ".[{extra}]"'
         if extra == "ray":  # its Gymnasium is another one
             how = 'pip install -c constraints-ray.txt -e ".[ray,tune]"'
             how += ", into a virtual environment of its own"

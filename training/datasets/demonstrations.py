@@ -38,7 +38,7 @@ def read_demonstrations(config: SACConfig) -> list[Recorded]:
     if any(importlib.util.find_spec(module) is None for module in ("minari", "h5py")):
         raise UsageError(
             "demonstrations require minari and h5py; to install, in a clone: "
-            'pip install -c constraints.txt ".[data]"'
+            'pip install -c constraints.txt -e ".[data]"'
         )
     import minari
     from minari.storage import get_dataset_path

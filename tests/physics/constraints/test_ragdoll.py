@@ -53,16 +53,15 @@ def figure():
 def test_a_figure_falls_and_comes_to_rest(fidelity):
     bodies, joints = figure()
     world = world_of(bodies, joints, fidelity)
-    before, moving = float(energy(world)[0]), []
-    for _ in range(150):
+    before = float(energy(world)[0])
+    for _ in range(250):
         world.advance(0.02)
-        moving.append(world.kinetic_energy()[0])
         assert float(energy(world)[0]) <= before * (1.0 + 1e-9)
         assert world.joint_error().max() < 1e-10
     bends = world.joint_position()[0]
     for joint, angle in zip(joints, bends, strict=True):
         if isinstance(joint, Hinge):
             assert joint.limits[0] - 1e-9 <= angle <= joint.limits[1] + 1e-9
-    assert np.median(moving[-25:]) < 1e-3  # a limb may still topple
+    assert world.kinetic_energy()[0] < 1e-3
     thinnest = np.array([min(body.shape.half_extents) for body in bodies])
     assert np.all(world.position[0, : len(bodies), 2] > thinnest - 2e-3)

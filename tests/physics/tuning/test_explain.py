@@ -4,7 +4,21 @@ import re
 
 import pytest
 
-from physics import PRESETS, Attractor, Body, Box, Fidelity, Ground, Material, Scene, Sphere, World
+from physics import (
+    PRESETS,
+    Attractor,
+    Body,
+    Box,
+    Fidelity,
+    Ground,
+    Material,
+    Mesh,
+    Scene,
+    Sphere,
+    Torus,
+    World,
+)
+from physics.reference import meshes
 from physics.reference.scenes import block_on_ground, tower
 from physics.scene.fidelity import NEWTON
 from physics.tuning.motion import Course, simulate
@@ -128,3 +142,28 @@ def test_impulses_name_the_contact_resolution_that_suits_them():
     assert "suits" not in stiff.explain(CUBE, costs=False)
     newton = Fidelity(law="impulse", solver="newton")
     assert "contact_resolution=50 suits" in newton.explain(CUBE, costs=False)
+
+
+def test_a_mesh_is_said_to_have_round_edges_and_a_ring_tips_where_a_rigid_one_does():
+    vertices, faces = meshes.cuboid((0.015, 0.015, 0.06))
+    slim = Scene([Body(Mesh(vertices=vertices, faces=faces), mass=0.1, position=(0, 0, 0.06))],
+                 [Ground()])  # fmt: skip
+    text = Fidelity().explain(slim, costs=False)
+    assert "sharp edges of meshes: rounded by 1.5 Mesh.cells or more" in text
+    assert "Standing" not in text
+    ring = Scene([Body(Torus(0.05, 0.02), mass=0.1, position=(0, 0, 0.02))], [Ground()])
+    assert "tips at 68.2° if it were rigid" in NEWTON.explain(ring, costs=False)
+
+
+def test_a_heavy_body_on_a_light_one_is_explained_as_a_world_warns_of_it():
+    light = Body(Box((0.02,) * 3), mass=0.05, position=(0, 0, 0.02))
+    heavy = Body(Box((0.02,) * 3), mass=5.0, position=(0, 0, 0.06))
+    text = Fidelity().explain(Scene([light, heavy], [Ground()]), costs=False)
+    assert "a World warns: body 1 presses on body 0 with 5 kg" in text
+
+
+def test_what_is_no_scene_or_no_law_says_what_would_be():
+    with pytest.raises(TypeError, match="scene must be Scene, got"):
+        Fidelity().explain([CUBE.bodies[0]])
+    with pytest.raises(ValueError, match=r"'balanced' is a preset: physics.PRESETS\['balanced'\]"):
+        Fidelity("balanced")

@@ -252,7 +252,7 @@ def test_play_requires_only_pygame(monkeypatch, capsys):
     assert cli.main(["play"]) == 2
     assert capsys.readouterr().err == (
         "error: this command requires no_such_pygame; "
-        'to install, in a clone: pip install -c constraints.txt ".[render]"\n'
+        'to install, in a clone: pip install -c constraints.txt -e ".[render]"\n'
     )
 
 

@@ -105,5 +105,5 @@ def test_a_missing_package_names_the_extra(capsys, monkeypatch):
     assert cli.main(["view"]) == 2
     assert capsys.readouterr().err == (
         "error: this command requires no_such_viser; to install, in a clone: "
-        'pip install -c constraints.txt ".[view]"\n'
+        'pip install -c constraints.txt -e ".[view]"\n'
     )
