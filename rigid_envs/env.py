@@ -48,9 +48,10 @@ class RigidEnv(gym.Env[Observation, Array]):
         obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
             [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
             the state is observed as `state`.
-        pixels: "rgb" (3 channels), "depth", "segmentation", or a tuple of several.
-        pixel_size: width and height of an observed picture, or (width, height).
-        frame_stack: how many steps' pictures are stacked along the channels, the last step's last.
+        pixels: "rgb" (3 channels, the default), "depth", "segmentation", or a tuple of several.
+        pixel_size: width and height of an observed picture, or (width, height); 84 by default.
+        frame_stack: how many steps' pictures are stacked along the channels, the last step's last;
+            1 by default.
         kernel: "special", "general", "auto" or None, see `physics.World`. With "auto", if no kernel
             that can advance a registered task has been compiled, its special one is.
         **arguments: arguments of the task, such as `blocks`.
@@ -76,9 +77,9 @@ class RigidEnv(gym.Env[Observation, Array]):
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
         obs_type: str = "state",
-        pixels: str | Sequence[str] = "rgb",
-        pixel_size: int | tuple[int, int] = 84,
-        frame_stack: int = 1,
+        pixels: str | Sequence[str] | None = None,
+        pixel_size: int | tuple[int, int] | None = None,
+        frame_stack: int | None = None,
         kernel: str | None = None,
         **arguments: Any,
     ) -> None:

@@ -56,9 +56,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
             [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
             the state is observed as `state`.
-        pixels: "rgb" (3 channels), "depth", "segmentation", or a tuple of several.
-        pixel_size: width and height of an observed picture, or (width, height).
-        frame_stack: how many steps' pictures are stacked along the channels, the last step's last.
+        pixels: "rgb" (3 channels, the default), "depth", "segmentation", or a tuple of several.
+        pixel_size: width and height of an observed picture, or (width, height); 84 by default.
+        frame_stack: how many steps' pictures are stacked along the channels, the last step's last;
+            1 by default.
         kernel: "special", "general", "auto" or None, see `physics.World`. With "auto", if no kernel
             that can advance a registered task has been compiled, its special one is.
         **arguments: arguments of the task, such as `blocks`.
@@ -91,9 +92,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         observe_parameters: bool = False,
         observe_task_guide: bool = False,
         obs_type: str = "state",
-        pixels: str | Sequence[str] = "rgb",
-        pixel_size: int | tuple[int, int] = 84,
-        frame_stack: int = 1,
+        pixels: str | Sequence[str] | None = None,
+        pixel_size: int | tuple[int, int] | None = None,
+        frame_stack: int | None = None,
         kernel: str | None = None,
         **arguments: Any,
     ) -> None:
@@ -131,6 +132,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self.single_action_space = self._runner.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of each world; -1 of one that has had none yet."""
+        return tuple(self._runner.seeds.tolist())
 
     @property
     def task(self) -> Task:
@@ -189,11 +195,13 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
         mask = np.asarray(mask)
-        if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
-            raise ValueError(
-                f"reset_mask must be bools of shape ({self.num_envs},), at least one of them True, "
-                f"got {mask.dtype} of shape {mask.shape}"
-            )
+        expected = (
+            f"reset_mask must be bools of shape ({self.num_envs},), at least one of them True"
+        )
+        if mask.dtype != bool:
+            raise TypeError(f"{expected}, got {mask.dtype}")
+        if mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(f"{expected}, got {mask.sum()} of shape {mask.shape}")
         return mask
 
     def _seeds(self, seed: int | list[int | None] | None) -> Array:
@@ -314,8 +322,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self._ended = np.array(ended)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Closes the window, if there is one."""
-        self._pictures.close()
+        """Closes the window, if there is one; also called where the constructor has raised."""
+        if hasattr(self, "_pictures"):
+            self._pictures.close()
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:

@@ -99,6 +99,10 @@ def test_every_command_has_help(command, capsys):
         (["scripted", "--env-kwargs", "target_jaw:true"], "did you mean 'target_yaw'?"),
         (["scripted", "--env-kwargs", "blocks:3"], "unknown argument 'blocks'"),
         (
+            ["train", "--n-envs", "100000000", "-n", "10000000000"],
+            "RigidEnvs/Push-v0: 100000000 worlds of this scene need",
+        ),
+        (
             ["scripted", "--env-kwargs", "obstacles:many"],
             "obstacles must be an integer, got 'many'",
         ),

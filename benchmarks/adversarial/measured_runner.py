@@ -77,11 +77,6 @@ class MeasuredRunner(Runner):
         self.reset(everyone)
 
     @property
-    def seeds(self) -> Array:
-        """[count] seed of each world."""
-        return self._seeds
-
-    @property
     def episodes(self) -> Array:
         """[count] number of each world's episode."""
         return self._episodes

@@ -59,6 +59,9 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
             raise TypeError(f"argument {argument!r} {_WHERE[argument]}")
         near = get_close_matches(argument, [*known, *others], 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
+        owners = [one.__name__ for one in TASKS.values() if argument in argument_names(one)]
+        if owners and name not in owners:
+            hint = f"it belongs to {' and '.join(owners)}; "
         accepted = f"{name} accepts {known or 'no arguments of its own'}"
         if others:
             accepted += f", every task accepts {sorted(others)}"

@@ -23,7 +23,6 @@ CHANNELS = {"rgb": 3, "depth": 1, "segmentation": 1}
 SIZE = 84  # pixels, the width and height that most learners from pixels use
 LEAST, MOST = 8, 1024  # pixels
 MOST_SOLIDS = 255  # that a byte tells apart
-DEFAULTS: dict[str, Any] = {"pixels": ("rgb",), "pixel_size": (SIZE, SIZE), "frame_stack": 1}
 DEEPEST = 2.0  # depth of the brightest pixel, as a share of the camera's distance
 
 
@@ -48,35 +47,36 @@ class PixelSettings(NamedTuple):
 
 
 def pixel_settings(
-    obs_type: str, pixels: Any, pixel_size: Any, frame_stack: int, camera: Any
+    obs_type: str, pixels: Any, pixel_size: Any, frame_stack: int | None, camera: Any
 ) -> PixelSettings | None:
     """Checked settings; None if the state alone is observed.
 
     Args:
         obs_type: one of `OBSERVATION_TYPES`.
-        pixels: one of `CHANNELS`, or several.
-        pixel_size: width and height in pixels, or (width, height).
-        frame_stack: how many steps a picture shows.
+        pixels: one of `CHANNELS`, or several; "rgb" if None.
+        pixel_size: width and height in pixels, or (width, height); `SIZE` if None.
+        frame_stack: how many steps a picture shows; 1 if None.
         camera: see `choose_camera`.
 
     Raises:
         TypeError, ValueError: an unknown name, or a number out of its range.
     """
     choice("obs_type", obs_type, OBSERVATION_TYPES)
-    kinds = _check_kinds(pixels)
-    size = pixel_size if isinstance(pixel_size, tuple | list) else (pixel_size, pixel_size)
-    if len(size) != 2:
-        raise ValueError(f"pixel_size must be a number or (width, height), got {pixel_size!r}")
-    width, height = (integer("pixel_size", n, low=LEAST, high=MOST) for n in size)
-    stack = integer("frame_stack", frame_stack, low=1, high=64)
     if obs_type == "state":
-        given = {"pixels": kinds, "pixel_size": (width, height), "frame_stack": stack}
+        given = {"pixels": pixels, "pixel_size": pixel_size, "frame_stack": frame_stack}
         for name, value in given.items():
-            if value != DEFAULTS[name]:
+            if value is not None:
                 raise ValueError(
                     f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "state"'
                 )
         return None
+    kinds = _check_kinds("rgb" if pixels is None else pixels)
+    pixel_size = SIZE if pixel_size is None else pixel_size
+    size = pixel_size if isinstance(pixel_size, tuple | list) else (pixel_size, pixel_size)
+    if len(size) != 2:
+        raise ValueError(f"pixel_size must be a number or (width, height), got {pixel_size!r}")
+    width, height = (integer("pixel_size", n, low=LEAST, high=MOST) for n in size)
+    stack = 1 if frame_stack is None else integer("frame_stack", frame_stack, low=1, high=64)
     return PixelSettings(obs_type == "pixels+state", kinds, width, height, stack, camera)
 
 

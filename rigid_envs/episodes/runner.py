@@ -251,6 +251,11 @@ class Runner:
         return self._pixels
 
     @property
+    def seeds(self) -> Array:
+        """[count] seed of each world; -1 of one that has had none yet."""
+        return np.where(self._episodes < 0, -1, self._seeds)
+
+    @property
     def seeded(self) -> bool:
         """Whether every world has been reset."""
         return self._seeded

@@ -1,6 +1,7 @@
 """Invalid input of a vector environment is named, and changes no world."""
 
 import copy
+import gc
 
 import gymnasium as gym
 import numpy as np
@@ -99,10 +100,9 @@ def test_a_bad_seed_is_named_and_resets_no_world(envs, seed, match):
     ("options", "match"),
     [
         ({"mask": 1}, r"options accepts only \"reset_mask\" and \"randomize\", got \['mask'\]"),
-        ({"reset_mask": [1, 0, 0, 0]}, r"bools of shape \(4,\).*got int64"),
         (
             {"reset_mask": np.ones(3, dtype=bool)},
-            r"bools of shape \(4,\).*got bool of shape \(3,\)",
+            r"bools of shape \(4,\).*got 3 of shape \(3,\)",
         ),
         ({"reset_mask": np.zeros(4, dtype=bool)}, "at least one of them True"),
     ],
@@ -112,6 +112,20 @@ def test_bad_options_are_named_and_reset_no_world(envs, options, match):
     with pytest.raises(ValueError, match=match):
         envs.reset(options=options)
     assert_untouched(envs, before)
+
+
+def test_a_mask_of_numbers_is_of_the_wrong_type(envs):
+    before = envs.get_state()
+    with pytest.raises(TypeError, match=r"reset_mask must be bools of shape \(4,\).*got int64"):
+        envs.reset(options={"reset_mask": [1, 0, 0, 0]})
+    assert_untouched(envs, before)
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_a_constructor_that_raises_leaves_nothing_that_raises_again():
+    with pytest.raises(ValueError, match="fidelity must be one of"):
+        make_vec(2, fidelity="quick")
+    gc.collect()
 
 
 def test_stepping_before_the_first_reset_raises():

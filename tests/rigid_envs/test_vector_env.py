@@ -198,6 +198,15 @@ def test_a_seed_restarts_the_episodes_whatever_came_before(together):
     assert_worlds_are_same(results, together[: EPISODE + 1], np.arange(20))
 
 
+def test_every_world_has_a_seed_of_its_own():
+    envs = make_vec(3)
+    assert envs.np_random_seed == (-1, -1, -1)
+    envs.reset(seed=[5, 9, 7])
+    assert envs.np_random_seed == (5, 9, 7)
+    envs.reset(seed=[None, 2, None])
+    assert envs.np_random_seed == (5, 2, 7)
+
+
 def test_a_world_whose_seed_is_none_starts_its_next_episode():
     """As in Gymnasium's vector of single environments."""
     native, sync = make_vec(4), make_vec(4, vectorization_mode="sync")

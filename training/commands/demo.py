@@ -56,3 +56,5 @@ def print_training(trained: TrainResult) -> None:
         f"{trained.seconds:.0f} s ({trained.steps / trained.seconds:,.0f} steps/s{in_envs}): "
         f"{trained.folder.path}"
     )
+    if trained.interrupted:
+        print(f"to go on: rigid-envs train --resume {trained.folder.path}")

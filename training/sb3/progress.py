@@ -24,11 +24,14 @@ class TrainingProgress(BaseCallback):
 
     Args:
         total_steps: Environment steps of the run.
+        rollout: Environment steps between two updates; a run has whole ones.
         quiet: Show nothing.
         seconds_before: Wall time of the run before it was resumed, in seconds.
     """
 
-    def __init__(self, total_steps: int, quiet: bool = False, seconds_before: float = 0.0):
+    def __init__(
+        self, total_steps: int, rollout: int, quiet: bool = False, seconds_before: float = 0.0
+    ):
         super().__init__()
         self.console = Console(quiet=quiet)
         self.bar = Progress(
@@ -41,10 +44,11 @@ class TrainingProgress(BaseCallback):
             console=Console(quiet=quiet or not self.console.is_terminal),
             refresh_per_second=2,
         )
-        self.total_steps = total_steps
+        self.asked, self.rollout = total_steps, rollout
+        self.total_steps = -(-total_steps // rollout) * rollout
         self.seconds_before = seconds_before
         self.steps_before = 0
-        self.task = self.bar.add_task("training", total=total_steps, success="–", speed=0.0)
+        self.task = self.bar.add_task("training", total=self.total_steps, success="–", speed=0.0)
         self.started = self.shown = self.printed = time.perf_counter()
 
     def close(self) -> None:
@@ -57,6 +61,11 @@ class TrainingProgress(BaseCallback):
         self.steps_before = self.model.num_timesteps
         self.started = self.shown = self.printed = time.perf_counter()
         self.bar.start()
+        if self.total_steps > 1.1 * self.asked:
+            self.console.print(
+                f"an update takes {self.rollout:,} steps: trains {self.total_steps:,} instead of "
+                f"{self.asked:,}"
+            )
         steps = getattr(self.model, "cloning_steps", 0)
         if steps and self.model._n_updates == 0:
             self.console.print(f"first, {steps:,} gradient steps imitate the demonstrations")

@@ -188,7 +188,7 @@ def _learn(
         if after_checkpoint is not None:
             after_checkpoint(folder)
 
-    progress = TrainingProgress(config.n_timesteps, quiet, before.total)
+    progress = TrainingProgress(config.n_timesteps, config.rollout, quiet, before.total)
     checkpoints = PeriodicCheckpoint(save_every or max(config.n_timesteps // 10, 1), save)
     rollout = CurrentRollout()
     callbacks = [checkpoints, progress, *_callbacks(config, worlds), *more, rollout]

@@ -143,10 +143,13 @@ def _make(env_id: str, env_kwargs: dict[str, Any], make: Callable[[], Made]) -> 
     _spec(env_id)
     try:
         return make()
+    except MemoryError as error:
+        raise UsageError(f"{env_id}: {error}") from None
     # Gymnasium checks some arguments by assert
     except (TypeError, ValueError, AssertionError, gym.error.Error) as error:
         own = "" if env_id.startswith("RigidEnvs/") else " (it is not an environment of rigid-envs)"
-        raise UsageError(f"{env_id}{own} rejects {env_kwargs}: {error}") from error
+        given = {name: value for name, value in env_kwargs.items() if name != "kernel"}
+        raise UsageError(f"{env_id}{own} rejects {given}: {error}") from error
 
 
 def _spec(env_id: str) -> Any:

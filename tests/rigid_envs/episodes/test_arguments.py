@@ -53,6 +53,7 @@ def test_a_single_argument_raises_for_vectors(name):
             "every task accepts ['",
         ),
         (PUSH, "blocks", "Push accepts ['target_yaw', 'obstacles', 'block'], every"),
+        (PUSH, "blocks", "unknown argument 'blocks': it belongs to Stack; Push accepts"),
         (PUSH, "count", "unknown argument 'count'"),  # an argument of the runner only
     ],
 )

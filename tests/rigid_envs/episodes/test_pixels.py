@@ -158,6 +158,7 @@ def test_a_camera_is_chosen_for_pixels_too():
         ({"pixel_size": (84, 84, 3)}, r"number or \(width, height\)"),
         ({"frame_stack": 0}, "frame_stack must be at least 1, got 0"),
         ({"obs_type": "state", "frame_stack": 2}, 'needs obs_type="pixels"'),
+        ({"obs_type": "state", "frame_stack": None, "pixel_size": 84}, "pixel_size=84 needs"),
         ({"camera": "left"}, "camera must be one of 'task', 'follow', 'front'"),
         ({"camera": {"place": (0, 0, 1)}}, "camera has no field 'place'"),
         ({"camera": {"position": (0, 0, -1)}}, "above the ground"),

@@ -73,7 +73,7 @@ def test_a_copy_opens_a_window_of_its_own(window):
 
 def test_a_missing_pygame_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(DependencyNotInstalled, match=r'constraints.txt "\.\[render\]"'):
+    with pytest.raises(DependencyNotInstalled, match=r'constraints.txt -e "\.\[render\]"'):
         Window(64, 48)
 
 

@@ -176,7 +176,7 @@ def test_datasets_of_other_programs_are_checked(config, monkeypatch, changed, me
 
 def test_without_minari_the_extra_is_named(config, monkeypatch):
     monkeypatch.setattr(demonstrations.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(UsageError, match=r'-c constraints.txt "\.\[data\]"'):
+    with pytest.raises(UsageError, match=r'-c constraints.txt -e "\.\[data\]"'):
         read_demonstrations(config)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
+from training.commands.demo import print_training
 from training.policies.trained_policy import trained_policy
 from training.results.plot import plot_learning_curves, read_learning_curve
 from training.runs.run_folder import LOCK
@@ -86,7 +87,17 @@ def test_normalization_is_saved_and_used(quick_ppo, tmp_path):
     assert not np.allclose(sb3.act(observation), with_statistics, atol=1e-6)
 
 
-def test_ctrl_c_saves_the_policy(quick_ppo, tmp_path, monkeypatch):
+def test_a_run_shorter_than_an_update_says_how_long_it_is(quick_ppo, tmp_path, capsys):
+    config = quick_ppo.replace(n_timesteps=10)
+    result = train(config, tmp_path)
+    assert result.steps == config.rollout
+    shown = " ".join(capsys.readouterr().out.split())
+    assert f"an update takes {config.rollout:,} steps: trains {config.rollout:,} instead of 10" in (
+        shown
+    )
+
+
+def test_ctrl_c_saves_the_policy_and_says_how_to_go_on(quick_ppo, tmp_path, monkeypatch, capsys):
     class CtrlC(BaseCallback):
         def _on_step(self) -> bool:
             if self.num_timesteps > 100:
@@ -97,6 +108,9 @@ def test_ctrl_c_saves_the_policy(quick_ppo, tmp_path, monkeypatch):
     result = train(quick_ppo, tmp_path, quiet=True)
     assert result.interrupted
     assert trained_policy(result.folder.path)
+    print_training(result)
+    command = capsys.readouterr().out.splitlines()[-1]
+    assert command == f"to go on: rigid-envs train --resume {result.folder.path}"
 
 
 def test_checkpoints_are_saved_during_training(quick_ppo, tmp_path, monkeypatch):
