@@ -1,6 +1,7 @@
 """Plots learning curves: of one run, or of several that differ only in their seed."""
 
 import csv
+import math
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from training.settings.environment_ids import folder_name
 from training.settings.errors import UsageError
 
 STEPS = "time/total_timesteps"
-SECONDS = "time/wall_time"
+SECONDS, ELAPSED = "time/wall_time", "time/time_elapsed"
 EXPLORING, EVALUATED = "rollout/success_rate", "eval/success_rate"
 """Success of training episodes, whose actions are sampled, and of the mean action."""
 POINTS = 200
@@ -74,7 +75,8 @@ def draw_learning_curves(
     """Plots one curve, or several thin curves with their mean and a band from minimum to maximum.
 
     The curves are those of the mean action; faint ones below them are those of training episodes.
-    Runs without evaluations have only the latter.
+    Runs without evaluations have only the latter. In the mean a run that ended at its target keeps
+    its last value.
 
     Args:
         curves: The curves, each with at least one row.
@@ -98,7 +100,7 @@ def draw_learning_curves(
             label = "mean action" if lines is evaluated else None
             axes.plot(*lines[0], label=label, marker=_mark(lines[0]))
         else:
-            _draw_spread(axes, lines, labels)
+            _draw_spread(axes, lines, labels, targets)
         axes.grid(alpha=0.3)
         axes.set_xlim(left=0)
         for target in targets:
@@ -124,9 +126,6 @@ def mean_and_spread(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Mean, minimum and maximum of several lines over the range that all of them cover.
 
-    The range ends with the shortest line: a run that stopped at its target cannot be distinguished
-    from one with fewer steps.
-
     Args:
         lines: For each line, the x values in ascending order and the y values.
 
@@ -148,12 +147,31 @@ def _line(rows: Curve, column: str, unit: float, success: str) -> tuple[np.ndarr
     return x, y
 
 
+def held(
+    lines: Sequence[tuple[np.ndarray, np.ndarray]], targets: Collection[float]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lines in which runs that ended at their target keep their last value up to the longest one.
+
+    Args:
+        lines: for each run, x values in ascending order and success in %.
+        targets: success rates at which training ends.
+    """
+    end, least = max(x[-1] for x, _ in lines), 100.0 * min(targets, default=math.inf)
+    return [
+        (np.append(x, end), np.append(y, y[-1])) if y[-1] >= least and x[-1] < end else (x, y)
+        for x, y in lines
+    ]
+
+
 def _draw_spread(
-    axes: Axes, lines: Sequence[tuple[np.ndarray, np.ndarray]], labels: Sequence[str]
+    axes: Axes,
+    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+    labels: Sequence[str],
+    targets: Collection[float],
 ) -> None:
     for line, label in zip(lines, labels, strict=True):
         axes.plot(*line, linewidth=0.7, alpha=0.8, label=label, marker=_mark(line))
-    shared = mean_and_spread(lines)
+    shared = mean_and_spread(held(lines, targets))
     if shared is not None:
         points, mean, lowest, highest = shared
         axes.fill_between(points, lowest, highest, color="black", alpha=0.12, linewidth=0)
@@ -177,13 +195,13 @@ def read_learning_curve(folder: RunFolder) -> Curve:
 
 def read_curve(progress: Path) -> Curve:
     """The rows of a file that have a success rate; errors as for `read_learning_curve`."""
-    columns = (STEPS, SECONDS, EXPLORING)
+    columns = (STEPS, SECONDS, ELAPSED, EXPLORING, EVALUATED)
     try:
         with progress.open(encoding="utf-8", newline="") as file:
             rows = [
-                {name: float(row[name]) for name in (*columns, EVALUATED) if row.get(name)}
+                {name: float(row[name]) for name in columns if row.get(name)}
                 for row in csv.DictReader(file)
-                if all(row.get(column) for column in columns)
+                if row.get(STEPS) and (row.get(EXPLORING) or row.get(EVALUATED))
             ]
     except FileNotFoundError:
         raise UsageError(
@@ -193,7 +211,24 @@ def read_curve(progress: Path) -> Curve:
         raise UsageError(f"{progress} is damaged: {error}") from None
     if not rows:
         raise UsageError(f"{progress} has no row with a success rate yet")
+    _fill_in_seconds(rows)
     return rows
+
+
+def _fill_in_seconds(rows: Curve) -> None:
+    """Writes the wall time of rows that lack it: by the clock of Stable-Baselines3.
+
+    That counts whole seconds, from zero again where a run was resumed.
+    """
+    begun = last = clock = 0.0
+    for row in rows:
+        elapsed = row.pop(ELAPSED, clock)
+        if elapsed < clock:
+            begun = last
+        if SECONDS in row:
+            begun = row[SECONDS] - elapsed
+        last = row[SECONDS] = max(begun + elapsed, last)
+        clock = elapsed
 
 
 def _check_comparable(folders: Sequence[RunFolder]) -> None:

@@ -12,6 +12,7 @@ from training.results.results_page import by_kind, image_paths, write_pages
 from training.results.video import record
 from training.runs.run_folder import RunFolder
 from training.settings.algorithms import ALGORITHMS
+from training.settings.config_file import load_config
 from training.settings.errors import UsageError, check_exists
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -112,11 +113,13 @@ def _update_images(
     (repository / curve).parent.mkdir(parents=True, exist_ok=True)
     if not (repository / curve).exists():
         folders = [result.folder(repository) for result in group]
+        config = load_config(group[0].algorithm, group[0].env_id, folders[0] / "config.yaml")
         draw_learning_curves(
             [read_curve(folder / "progress.csv") for folder in folders],
             repository / curve,
             title=group[0].title,
             labels=[f"seed {result.seed}" for result in group],
+            targets=[rate for rate in (config.target_success_rate,) if rate is not None],
         )
         report(f"plotted  {curve}")
     if not (repository / video).exists():

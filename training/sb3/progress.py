@@ -72,6 +72,8 @@ class TrainingProgress(BaseCallback):
 
     def _on_step(self) -> bool:
         now = time.perf_counter()
+        # off-policy algorithms write rows of the learning curve between two updates
+        self.logger.record("time/wall_time", round(self.seconds_before + now - self.started, 3))
         if now - self.shown > SECONDS_BETWEEN_UPDATES:
             self.shown = now
             self._show()

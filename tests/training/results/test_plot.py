@@ -1,12 +1,22 @@
 """Plots of learning curves, of one run or several seeds."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from training.commands import cli
-from training.results.plot import mean_and_spread, plot_learning_curves
+from training.results.plot import (
+    EVALUATED,
+    EXPLORING,
+    SECONDS,
+    STEPS,
+    held,
+    mean_and_spread,
+    plot_learning_curves,
+    read_curve,
+)
 from training.runs.run_folder import RunFolder, create_run_folder
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
@@ -37,6 +47,38 @@ def test_mean_and_range_cover_the_common_range():
     np.testing.assert_allclose(lowest, 10 * points)
     np.testing.assert_allclose(highest, 20 + 10 * points)
     np.testing.assert_allclose(mean, 10 + 10 * points)
+
+
+def test_a_run_that_ended_at_its_target_keeps_its_last_value_in_the_mean():
+    lines = [(np.array([0.0, 2.0]), np.array([0.0, 96.0])), (np.array([0.0, 4.0]), [0.0, 95.0])]
+    points, mean, _, _ = mean_and_spread(held(lines, {0.95}))
+    assert points[-1] == 4.0
+    assert mean[-1] == pytest.approx(95.5)
+    assert mean_and_spread(held(lines, {0.97}))[0][-1] == 2.0  # it may have had fewer steps
+
+
+def test_rows_of_evaluations_alone_and_rows_without_a_wall_time_are_kept(tmp_path):
+    """SAC writes rows between updates; Stable-Baselines3's clock begins anew in a resumption."""
+    path = tmp_path / "progress.csv"
+    path.write_text(
+        "time/total_timesteps,time/wall_time,time/time_elapsed,rollout/success_rate,"
+        "eval/success_rate\n"
+        "10,1.5,1,0.1,\n20,,3,0.2,\n30,,4,,0.5\n40,,1,0.6,\n50,7.25,2,0.7,0.9\n"
+    )
+    rows = read_curve(path)
+    assert [row[SECONDS] for row in rows] == [1.5, 3.5, 4.5, 5.5, 7.25]
+    assert rows[2]["eval/success_rate"] == 0.5
+    assert "rollout/success_rate" not in rows[2]
+
+
+@pytest.mark.parametrize("folder", sorted(Path("results").glob("*/*")), ids=lambda path: path.name)
+def test_a_recorded_curve_ends_where_the_table_says(folder):
+    recorded = json.loads((folder / "result.json").read_text())
+    rows = read_curve(folder / "progress.csv")
+    assert rows[-1][STEPS] == pytest.approx(recorded["steps"], rel=0.05)
+    evaluated = [row[EVALUATED] for row in rows if EVALUATED in row]
+    shown = evaluated[-1] if evaluated else rows[-1][EXPLORING]
+    assert shown == pytest.approx(recorded["success_at_end"]["rate"], abs=0.1)
 
 
 def test_lines_without_a_common_range_have_no_mean():
