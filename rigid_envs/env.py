@@ -45,9 +45,11 @@ class RigidEnv(gym.Env[Observation, Array]):
         observe_task_guide: append the task's guide to the observation: what is left to do, computed
             from both goals. Do not use it with learners that relabel goals (HER): the guide would
             still show the original goal.
-        obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
-            [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
-            the state is observed as `state`.
+        obs_type: "state", "flat", "pixels" or "pixels+state". "flat" observes state, achieved goal
+            and desired goal in this order in one array [n], for learners without dictionaries; it
+            is a value of this argument because pictures can't be part of it. With pixels,
+            `observation` is a picture [height, width, channels] uint8; the goals stay numbers, and
+            are not drawn. With both, the state is observed as `state`.
         pixels: "rgb" (3 channels, the default), "depth", "segmentation", or a tuple of several.
         pixel_size: width and height of an observed picture, or (width, height); 84 by default.
         frame_stack: how many steps' pictures are stacked along the channels, the last step's last;
@@ -98,6 +100,7 @@ class RigidEnv(gym.Env[Observation, Array]):
             observe_task_guide,
             pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
             kernel,
+            obs_type == "flat",
         )
         self._limit_is_default = max_episode_steps is None
         self._pictures = Pictures(
@@ -249,6 +252,8 @@ class RigidEnv(gym.Env[Observation, Array]):
 
 
 def _first(observation: Observation) -> Observation:
+    if not isinstance(observation, dict):
+        return observation[0]
     return {name: values[0] for name, values in observation.items()}
 
 

@@ -53,9 +53,11 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         observe_task_guide: append the task's guide to the observation: what is left to do, computed
             from both goals. Do not use it with learners that relabel goals (HER): the guide would
             still show the original goal.
-        obs_type: "state", "pixels" or "pixels+state". With pixels, `observation` is a picture
-            [height, width, channels] uint8; the goals stay numbers, and are not drawn. With both,
-            the state is observed as `state`.
+        obs_type: "state", "flat", "pixels" or "pixels+state". "flat" observes state, achieved goal
+            and desired goal in this order in one array [n], for learners without dictionaries; it
+            is a value of this argument because pictures can't be part of it. With pixels,
+            `observation` is a picture [height, width, channels] uint8; the goals stay numbers, and
+            are not drawn. With both, the state is observed as `state`.
         pixels: "rgb" (3 channels, the default), "depth", "segmentation", or a tuple of several.
         pixel_size: width and height of an observed picture, or (width, height); 84 by default.
         frame_stack: how many steps' pictures are stacked along the channels, the last step's last;
@@ -116,6 +118,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             observe_task_guide,
             pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
             kernel,
+            obs_type == "flat",
         )
         self._pictures = Pictures(
             self._runner,
@@ -260,7 +263,10 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         """Last observations and infos of the worlds that ended, with Gymnasium's names."""
         last = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
-            last[i] = {name: values[i] for name, values in observation.items()}
+            if isinstance(observation, dict):
+                last[i] = {name: values[i] for name, values in observation.items()}
+            else:
+                last[i] = observation[i]
         final_info = {name: values.copy() for name, values in info.items()}
         final_info |= {f"_{name}": ended for name in info}
         return {
@@ -269,6 +275,35 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             "final_info": final_info,
             "_final_info": ended,
         }
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """The result of a method, or an attribute, once for each world: all worlds share it."""
+        found = getattr(self, name)
+        return (found(*args, **kwargs) if callable(found) else found,) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute, once for each world: all worlds share it."""
+        return (getattr(self, name),) * self.num_envs
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute.
+
+        Args:
+            name: its name.
+            values: one value, or a list or tuple of one for each world, all of them equal.
+
+        Raises:
+            ValueError: values differ, or there are not as many as worlds.
+        """
+        if isinstance(values, list | tuple):
+            same = len(values) == self.num_envs and all(one == values[0] for one in values)
+            if not same:
+                raise ValueError(
+                    f"values of {name!r} must be {self.num_envs} equal ones, as all worlds share "
+                    f"the attribute; got {values!r}"
+                )
+            values = values[0]
+        setattr(self, name, values)
 
     @property
     def reward(self) -> Reward:

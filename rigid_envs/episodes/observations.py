@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from rigid_envs.episodes.runner import Runner
 
 Array = np.ndarray
-Observation = dict[str, Array]
+Observation = Any
+"""Arrays by name; or all of it in one array [..., n], with obs_type="flat"."""
 
 
 class Observations:
@@ -28,6 +29,7 @@ class Observations:
         parameters: whether the drawn parameters are appended, see `Randomization`.
         guide: whether the task's guide is appended, see `Task.guide`.
         pixels: what pixels are observed; None if only the state is.
+        flat: whether state and goals are observed as one array.
 
     Attributes:
         parameters: see above.
@@ -40,7 +42,12 @@ class Observations:
     """
 
     def __init__(
-        self, runner: "Runner", parameters: bool, guide: bool, pixels: PixelSettings | None
+        self,
+        runner: "Runner",
+        parameters: bool,
+        guide: bool,
+        pixels: PixelSettings | None,
+        flat: bool,
     ) -> None:
         self._runner, self._task = runner, runner.task
         self.parameters: bool = instance("observe_parameters", parameters, bool)
@@ -69,7 +76,13 @@ class Observations:
             if self._keeps_state:
                 observed["state"] = observed["observation"]
             observed["observation"] = self.pixels.space
-        self.space = spaces.Dict(observed)
+        self._flat = flat
+        self.space: spaces.Space[Any] = spaces.Dict(observed)
+        if flat:
+            # in this order of names; `gymnasium.spaces.flatten` sorts them
+            ends = [(low, high), (goal_low, goal_high), (goal_low, goal_high)]
+            lows, highs = (np.concatenate(part) for part in zip(*ends, strict=True))
+            self.space = spaces.Box(lows, highs, dtype=np.float32)
         self._checked = False
 
     def observe(
@@ -108,6 +121,9 @@ class Observations:
                 check_written(task, "guide", task.guide_bounds, guide)
         self._checked = True
         rows = split(table, self._low, self._high, desired, joins, self._runner.reward.measure)
+        if self._flat:
+            parts = (rows.observation, rows.achieved, rows.desired)
+            return np.concatenate(parts, axis=1), rows, achieved
         # one row per world, as users expect
         observation = {
             "observation": rows.observation,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 Observation = dict[str, Array]
 
-OBSERVATION_TYPES = ("state", "pixels", "pixels+state")
+OBSERVATION_TYPES = ("state", "flat", "pixels", "pixels+state")
 CHANNELS = {"rgb": 3, "depth": 1, "segmentation": 1}
 """How many bytes of a pixel each kind takes."""
 
@@ -62,12 +62,12 @@ def pixel_settings(
         TypeError, ValueError: an unknown name, or a number out of its range.
     """
     choice("obs_type", obs_type, OBSERVATION_TYPES)
-    if obs_type == "state":
+    if not obs_type.startswith("pixels"):
         given = {"pixels": pixels, "pixel_size": pixel_size, "frame_stack": frame_stack}
         for name, value in given.items():
             if value is not None:
                 raise ValueError(
-                    f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "state"'
+                    f'{name}={value!r} needs obs_type="pixels" or "pixels+state", got "{obs_type}"'
                 )
         return None
     kinds = _check_kinds("rgb" if pixels is None else pixels)

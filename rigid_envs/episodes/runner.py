@@ -61,6 +61,7 @@ class Runner:
         observe_task_guide: append the task's guide to the observation, see `Task.guide`.
         pixels: what pixels are observed; None if only the state is.
         kernel: see `rigid_envs.RigidEnv`.
+        flat: whether state and goals are observed as one array.
         **arguments: arguments of the task, if it is given by name or class.
 
     Attributes:
@@ -83,6 +84,7 @@ class Runner:
         observe_task_guide: bool = False,
         pixels: PixelSettings | None = None,
         kernel: str | None = None,
+        flat: bool = False,
         **arguments: Any,
     ) -> None:
         """Builds the worlds. Call `reset` to start episodes."""
@@ -106,7 +108,9 @@ class Runner:
         self.reward = reward.with_time_penalty() if self.terminate_on_success else reward
         self._has_task_terms = bool(self.reward.task_terms)
 
-        self._observations = Observations(self, observe_parameters, observe_task_guide, pixels)
+        self._observations = Observations(
+            self, observe_parameters, observe_task_guide, pixels, flat
+        )
         self.bounds, self.observation_space = self._observations.bounds, self._observations.space
         self._pixels = self._observations.pixels
         size = (len(self.task.actions),)

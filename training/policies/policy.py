@@ -40,10 +40,10 @@ def scripted_policy(env_id: str, **env_kwargs: Any) -> Policy:
         UsageError: The id is unknown, its task has no controller, or the state is not observed.
     """
     controller = controller_for(env_id)
-    if env_kwargs.get("obs_type") == "pixels":
+    if env_kwargs.get("obs_type") in ("pixels", "flat"):
         raise UsageError(
-            "obs_type is 'pixels', should be 'state' or 'pixels+state': a scripted controller acts "
-            "from the state"
+            f"obs_type is {env_kwargs['obs_type']!r}, should be 'state' or 'pixels+state': a "
+            "scripted controller acts from the state, by name"
         )
     parameters = signature(controller).parameters
     passed = {name: value for name, value in env_kwargs.items() if name in parameters}

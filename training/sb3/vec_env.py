@@ -176,7 +176,9 @@ class RigidVecEnv(VecEnv):
         return deepcopy(first) or None
 
 
-def _copied(observation: Observation) -> Observation:
+def _copied(observation: Any) -> Any:
+    if not isinstance(observation, dict):  # obs_type="flat"
+        return np.array(observation)
     return {key: np.array(value) for key, value in observation.items()}
 
 

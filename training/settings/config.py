@@ -267,6 +267,11 @@ class TrainConfig:
                     raise UsageError(f"{where}: policy_kwargs: {name} requires {required}")
         for kwargs in (self.env_kwargs, self.final_env_kwargs):
             observed = str(kwargs.get("obs_type", "state"))
+            if observed == "flat":
+                raise UsageError(
+                    f"{where}: obs_type is flat, should be state: the policies of this command "
+                    "read observations by name; flat ones are for other learners"
+                )
             if observed.startswith("pixels") != (self.policy in self.pixel_policies):
                 raise UsageError(
                     f"{where}: policy is {self.policy} with obs_type {observed}: "
