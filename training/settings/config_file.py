@@ -27,13 +27,16 @@ SECTIONS = (
     "finetune_timesteps", "finetune_env_kwargs", "cloning_steps", "cloning_weight",
 )  # fmt: skip
 """This project's own settings that may be top-level sections of a file."""
+DEFAULT = "default"
+"""Entry of a file that holds for registered environments without one of their own."""
 
 
 def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig:
     """Reads the settings of an algorithm for an environment.
 
     A dense id such as RigidEnvs/PushDense-v0 has the settings of RigidEnvs/Push-v0, if those train
-    with `reward_type: dense` and the file has no entry for the dense id.
+    with `reward_type: dense` and the file has no entry for the dense id. A registered environment
+    without settings has those of the entry `default`, if there is one.
 
     Args:
         algo: "ppo" or "sac".
@@ -52,6 +55,9 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     entries = _read_yaml(path if path is not None else CONFIG_FOLDER / f"{algo}.yaml", source)
     key = _entry_of(env_id, entries)
     sections = {name: entries.pop(name, {}) for name in SECTIONS}
+    default = entries.pop(DEFAULT, None)
+    if default is not None and key not in entries and env_id in gym.registry:
+        entries[key] = default
     _check_entries(entries, env_id, source)
     _check_sections(sections, entries, source)
     if key not in entries:
@@ -78,7 +84,7 @@ def packaged_environments(algo: str) -> list[str]:
     """Ids of the environments that an algorithm's packaged file has settings for."""
     source = f"configs/{algo}.yaml"
     entries = _read_yaml(CONFIG_FOLDER / f"{algo}.yaml", source)
-    return [name for name in entries if name not in SECTIONS]
+    return [name for name in entries if name not in (*SECTIONS, DEFAULT)]
 
 
 def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:

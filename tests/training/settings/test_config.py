@@ -7,7 +7,7 @@ import pytest
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.settings.algorithms import ALGORITHMS, PPOConfig
-from training.settings.config_file import load_config
+from training.settings.config_file import load_config, packaged_environments
 from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError, nearest
 
@@ -280,3 +280,16 @@ def test_replaced_values_are_validated(quick_ppo):
 def test_settings_are_frozen(quick_ppo: PPOConfig):
     with pytest.raises(dataclasses.FrozenInstanceError):
         quick_ppo.n_envs = 4
+
+
+def test_a_registered_task_without_settings_has_those_of_default():
+    """A hundred updates or more: with too few, nothing is learned."""
+    gym.register("Own-v0", entry_point="rigid_envs:RigidEnv", kwargs={"task": "reach"})
+    try:
+        config = load_config("ppo", "Own-v0")
+    finally:
+        del gym.registry["Own-v0"]
+    assert config.n_timesteps >= 100 * config.rollout
+    assert "default" not in packaged_environments("ppo")
+    with pytest.raises(UsageError, match="no settings for environment 'Own-v0'"):
+        load_config("ppo", "Own-v0")  # it isn't registered any more
