@@ -110,7 +110,7 @@ class CodeFile:
         return any(path.exists() for path in self._paths)
 
     def load(self) -> Any | None:
-        """What was saved; None if nothing was, or if it is damaged."""
+        """What was saved; None if nothing was, or it is damaged or of a module that isn't here."""
         for path in self._paths:
             try:
                 data = path.read_bytes()
@@ -118,7 +118,10 @@ class CodeFile:
                 continue
             hashed, body = data[:_HASH_SIZE], data[_HASH_SIZE:]
             if hashed == _hash(body):
-                return pickle.loads(zlib.decompress(body))
+                try:
+                    return pickle.loads(zlib.decompress(body))
+                except ImportError:  # it refers to what another process has defined
+                    continue
         return None
 
     def save(self, content: Any) -> None:

@@ -93,6 +93,15 @@ def test_damaged_files_are_compiled_again(copied):
     assert run(cache, root=root)[0] == [0.0, result]
 
 
+def test_what_refers_to_a_module_that_is_not_here_is_compiled_again(tmp_path):
+    """As the code of a page or a cell, in which a user defines a stage."""
+    (tmp_path / "page.txt").write_text(TURN)
+    program = "exec(compile(open({0!r}).read(), {0!r}, 'exec'), {{'__name__': 'elsewhere'}})"
+    program = program.format(str(tmp_path / "page.txt"))
+    first, again = (run(tmp_path / "cache", program)[0] for _ in range(2))
+    assert first == again
+
+
 def test_a_complete_cache_may_be_read_only(copied):
     root, cache, result = copied
     for path in [*cache.rglob("*"), cache]:
