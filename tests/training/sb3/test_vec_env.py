@@ -1,6 +1,8 @@
 """RigidVecEnv: one test for each difference between the interfaces of Gymnasium and SB3."""
 
 import copy
+import importlib
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -10,6 +12,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
+import training.sb3
 from tests.training.reach import ReachVectorEnv, straight_to_the_goal
 from training.sb3.vec_env import RigidVecEnv
 
@@ -273,3 +276,9 @@ def test_vec_normalize_scales_terminal_observations_once():
     scaled = infos[0]["terminal_observation"]
     original = env.unnormalize_obs(scaled)
     np.testing.assert_allclose(original["achieved_goal"], [2.5, 0], atol=1e-5)
+
+
+def test_without_stable_baselines_the_import_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    with pytest.raises(ModuleNotFoundError, match=r'constraints.txt -e "\.\[train\]"'):
+        importlib.reload(training.sb3)
