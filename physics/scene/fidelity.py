@@ -106,7 +106,7 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         """Checks every field."""
-        if self.law in ("fast", "balanced", "accurate", "solid"):
+        if isinstance(self.law, str) and self.law in ("fast", "balanced", "accurate", "solid"):
             raise ValueError(f"{self.law!r} is a preset: physics.PRESETS[{self.law!r}]")
         choice("Fidelity.law", self.law, LAWS)
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
