@@ -106,7 +106,8 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         """Checks every field."""
-        if isinstance(self.law, str) and self.law in ("fast", "balanced", "accurate", "solid"):
+        # a law isn't looked up: the presets themselves are built before there are any
+        if isinstance(self.law, str) and self.law not in LAWS and self.law in PRESETS:
             raise ValueError(f"{self.law!r} is a preset: physics.PRESETS[{self.law!r}]")
         choice("Fidelity.law", self.law, LAWS)
         choice("Fidelity.geometry", self.geometry, GEOMETRIES)
