@@ -9,6 +9,7 @@ from physics import snapshot
 from physics.analysis.failures import failure
 from physics.analysis.integrator_limits import check_integrator
 from physics.analysis.lane_queries import LaneQueries
+from physics.analysis.odd_scenes import warn_of_odd_scenes
 from physics.analysis.parameter_limits import ParameterLimits
 from physics.analysis.soft_supports import warn_of_soft_supports
 from physics.analysis.solids import Solids
@@ -110,6 +111,8 @@ class World(Readings):
             if not allow_unstable:
                 check_step(scene, self.fidelity, self._simulation.base, self.features)
                 warn_of_soft_supports(scene, self.fidelity, self._simulation.base)
+        if not allow_unstable:
+            warn_of_odd_scenes(scene, self.fidelity)
         self._limits = ParameterLimits(scene, self.fidelity)
         self._solids = Solids(scene.solid_names, self._queries.can_touch)
 

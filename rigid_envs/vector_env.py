@@ -41,7 +41,8 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
             if None. With "follow" frames follow the achieved goal; pixels that are observed do not.
         show_forces: draw contact forces.
         show_particles: draw the collision samples of the solids in their outlines.
-        render_worlds: largest number of worlds to draw; the first ones are drawn.
+        render_worlds: largest number of worlds to draw; the first ones are drawn. If None, all of
+            them with "rgb_array", 16 with "human".
         max_episode_steps: number of steps after which an episode is truncated; the task's number if
             None, no limit if -1.
         terminate_on_success: whether success terminates an episode.
@@ -85,7 +86,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         camera: Any = None,
         show_forces: bool = False,
         show_particles: bool = False,
-        render_worlds: int = 16,
+        render_worlds: int | None = None,
         max_episode_steps: int | None = None,
         terminate_on_success: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -325,7 +326,7 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
     def render(self) -> tuple[Array, ...] | None:
         """A frame [height, width, 3] uint8 of each of the first worlds.
 
-        "human" shows them in a grid. At most `render_worlds` worlds are drawn.
+        "human" shows them in a grid. Of each world, or of the first `render_worlds`.
         `rigid_envs.rendering.renderer.grid` tiles the frames.
         """
         if self.render_mode is None:

@@ -23,6 +23,7 @@ RENDER_MODES = ("rgb_array", "human")
 SIZE = 480  # pixels, width and height of a frame
 FPS = 25
 WINDOW = 960  # pixels, widest that a window of many worlds gets
+IN_WINDOW = 16  # worlds that a window shows, if it isn't told how many
 LEAST, MOST = 16, 4096  # pixels, width or height of a frame
 
 
@@ -39,10 +40,13 @@ class Pictures:
         camera: a name, a Camera or its settings, see `choose_camera`.
         show_forces: draw contact forces.
         show_particles: draw what touches in place of exact shapes.
-        worlds: how many to draw at most.
+        worlds: how many to draw at most; if None all of them, or `IN_WINDOW` in a window.
 
     Attributes:
         camera: where to look from; with "follow" the task's camera, which each frame moves.
+
+    Raises:
+        NoDisplay: a window where there is nothing to show it on.
     """
 
     def __init__(
@@ -54,9 +58,9 @@ class Pictures:
         camera: Any = None,
         show_forces: bool = False,
         show_particles: bool = False,
-        worlds: int = 1,
+        worlds: int | None = None,
     ) -> None:
-        """Checks all arguments."""
+        """Checks all arguments. A window opens with its first picture."""
         if mode is not None:
             choice("render_mode", mode, RENDER_MODES)
         self._runner, self._mode = runner, mode
@@ -67,9 +71,11 @@ class Pictures:
         self.camera = choose_camera(camera, runner.task, self._width / self._height)
         self._follows = isinstance(camera, str) and camera == FOLLOW
         self._floor = scene_view.floor(runner.world.scene).height
+        if worlds is None:
+            worlds = IN_WINDOW if mode == "human" else runner.count
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)
         self._renderer: Renderer | None = None
-        self._window: Window | None = None
+        self._window = self._make_window() if mode == "human" else None
         self._warned = False
         if mode is None and runner.pixels is not None and (width, height) != (SIZE, SIZE):
             gym.logger.warn(
@@ -82,21 +88,17 @@ class Pictures:
         if self._count < self._runner.count and not self._warned:
             self._warned = True
             gym.logger.warn(
-                f"render() draws {self._count} of {self._runner.count} worlds; render_worlds=... "
-                "draws more. RecordVideo wants a picture of every world"
+                f"render() draws render_worlds={self._count} of {self._runner.count} worlds; "
+                "RecordVideo and HumanRendering want a picture of every world"
             )
         return self._draw(self._width, self._height)
 
     def show(self) -> None:
-        """Draws the first worlds in a window, as a grid."""
-        columns = math.ceil(math.sqrt(self._count))
-        share = min(1.0, WINDOW / (columns * self._width))
-        width, height = max(round(share * self._width), 1), max(round(share * self._height), 1)
+        """Draws the first worlds in a window, as a grid; after `close` in a new one."""
         if self._window is None:
-            rows = -(-self._count // columns)
-            title = type(self._runner.task).__name__
-            self._window = Window(columns * width, rows * height, FPS, title)
+            self._window = self._make_window()
         if not self._window.closed:
+            columns, width, height = self._tiles
             self._window.show(grid(self._draw(width, height), columns))
 
     def close(self) -> None:
@@ -104,6 +106,18 @@ class Pictures:
         if self._window is not None:
             self._window.close()
         self._window = self._renderer = None
+
+    @property
+    def _tiles(self) -> tuple[int, int, int]:
+        """In a window: frames in a row, and a frame's width and height in pixels."""
+        columns = math.ceil(math.sqrt(self._count))
+        share = min(1.0, WINDOW / (columns * self._width))
+        return columns, max(round(share * self._width), 1), max(round(share * self._height), 1)
+
+    def _make_window(self) -> Window:
+        columns, width, height = self._tiles
+        rows = -(-self._count // columns)
+        return Window(columns * width, rows * height, FPS, type(self._runner.task).__name__)
 
     def _draw(self, width: int, height: int) -> tuple[Array, ...]:
         if self._follows:

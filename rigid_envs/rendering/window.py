@@ -60,6 +60,7 @@ class Window:
     Raises:
         ValueError: a size or rate that is not positive.
         DependencyNotInstalled: pygame is missing.
+        NoDisplay: there is nothing to show a window on.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Window:
         self.lines = integer("lines", lines, low=0)
         self.closed = False
         self._pygame = load_pygame()
+        _check_display(self._pygame)
         self._surface: Any = None
         self._clock: Any = None
 
@@ -84,9 +86,6 @@ class Window:
 
         Returns:
             The keys that went down or up since the last picture, in order.
-
-        Raises:
-            NoDisplay: there is none.
         """
         if self.closed:
             return []
@@ -111,15 +110,7 @@ class Window:
         self._surface, self.closed = None, True
 
     def _open(self) -> None:
-        try:
-            self._pygame.display.init()
-        except self._pygame.error:
-            raise NoDisplay(NO_DISPLAY) from None
-        # without a display SDL draws to nowhere; whoever names such a driver wants it
-        driver = self._pygame.display.get_driver()
-        if "SDL_VIDEODRIVER" not in os.environ and driver in ("offscreen", "dummy"):
-            self._pygame.display.quit()
-            raise NoDisplay(NO_DISPLAY)
+        self._pygame.display.init()
         room = LINE_HEIGHT * self.lines + (LINE_HEIGHT // 2 if self.lines else 0)
         self._surface = self._pygame.display.set_mode((self.width, self.height + room))
         self._pygame.display.set_caption(self.title)
@@ -143,3 +134,18 @@ class Window:
                 down = event.type == self._pygame.KEYDOWN
                 found.append(Key(self._pygame.key.name(event.key), down))
         return found
+
+
+def _check_display(pygame: Any) -> None:
+    """Raises NoDisplay where no window could be opened; windows that are open stay open."""
+    if pygame.display.get_init():
+        return
+    try:
+        pygame.display.init()
+    except pygame.error:
+        raise NoDisplay(NO_DISPLAY) from None
+    # without a display SDL draws to nowhere; whoever names such a driver wants it
+    driver = pygame.display.get_driver()
+    pygame.display.quit()
+    if "SDL_VIDEODRIVER" not in os.environ and driver in ("offscreen", "dummy"):
+        raise NoDisplay(NO_DISPLAY)

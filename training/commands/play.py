@@ -137,7 +137,10 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
     arguments = {"max_episode_steps": -1, "width": SIZE, "height": SIZE, **env_kwargs}
     env = make_single_env(env_id, render_mode="rgb_array", **arguments)
     width, height, played = arguments["width"], arguments["height"], 0
-    window = Window(width, height, fps, f"{env_id}: play", len(HELP) + 1)
+    try:
+        window = Window(width, height, fps, f"{env_id}: play", len(HELP) + 1)
+    except NoDisplay:
+        raise UsageError("cannot open a window: there is no display") from None
     with closing(env), closing(window):
         game = Game(env, seed)
         while not (window.closed or game.quit):
@@ -153,7 +156,5 @@ def _show(window: Window, frame: Array, text: Sequence[str]) -> list[Key]:
     pygame = load_pygame()
     try:
         return window.show(frame, text)
-    except NoDisplay:
-        raise UsageError("cannot open a window: there is no display") from None
     except pygame.error as error:
         raise UsageError(f"cannot open a window: {error}") from None

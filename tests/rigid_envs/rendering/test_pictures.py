@@ -147,20 +147,40 @@ def test_episodes_of_many_worlds_can_be_filmed(env_id, tmp_path):
     assert length_and_size(film) == (9, (320, 320))
 
 
-def test_of_many_worlds_the_first_are_drawn():
+def test_of_many_worlds_all_are_drawn():
     envs = make_vec(40, render_mode="rgb_array", width=64, height=64, fidelity="fast")
     envs.reset(seed=0)
-    with pytest.warns(UserWarning, match=r"draws 16 of 40 worlds; render_worlds=\.\.\. draws more"):
-        assert len(envs.render()) == 16
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert len(envs.render()) == 16  # said once
-    more = make_vec(
-        40, render_mode="rgb_array", width=16, height=16, render_worlds=20, fidelity="fast"
+        assert len(envs.render()) == 40
+    some = make_vec(
+        40, render_mode="rgb_array", width=64, height=64, render_worlds=20, fidelity="fast"
     )
-    more.reset(seed=0)
-    with pytest.warns(UserWarning, match="draws 20 of 40"):
-        assert len(more.render()) == 20
+    some.reset(seed=0)
+    with pytest.warns(UserWarning, match=r"render_worlds=20 of 40 worlds; RecordVideo"):
+        frames = some.render()
+    assert len(frames) == 20
+    assert np.array_equal(frames[19], envs.render()[19])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        some.render()  # said once
+
+
+def test_more_worlds_than_a_window_shows_can_be_filmed(tmp_path):
+    """Gymnasium's wrappers want a frame of every world."""
+    size = {"width": 32, "height": 32, "max_episode_steps": 2}
+    envs = RecordVectorVideo(
+        make_vec(20, render_mode="rgb_array", **size),
+        str(tmp_path / "films"),
+        episode_trigger=lambda k: k == 0,
+        disable_logger=True,
+    )
+    envs.reset(seed=0)
+    for _ in range(4):
+        envs.step(envs.action_space.sample())
+    envs.close()
+    (film,) = tmp_path.glob("films/*.mp4")
+    assert length_and_size(film)[1] == (160, 128)
 
 
 @pytest.mark.parametrize("env_id", [one for one in IDS if one != REACH])  # there nothing touches

@@ -8,6 +8,7 @@ import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
+from rigid_envs import RigidEnv, RigidVectorEnv
 from rigid_envs.rendering.window import Key, NoDisplay, Window
 
 PICTURE = np.zeros((48, 64, 3), np.uint8)
@@ -41,7 +42,16 @@ def test_without_a_display_there_is_no_window(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
     with pytest.raises(NoDisplay, match="there is no display; render_mode="):
-        Window(64, 48).show(PICTURE)
+        Window(64, 48)
+
+
+def test_an_environment_without_a_display_is_refused_before_anything_is_compiled(monkeypatch):
+    monkeypatch.delenv("SDL_VIDEODRIVER", raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "dummy")
+    with pytest.raises(NoDisplay, match="there is no display; render_mode="):
+        RigidEnv("push", render_mode="human")
+    with pytest.raises(NoDisplay, match="there is no display; render_mode="):
+        RigidVectorEnv("push", 4, render_mode="human")
 
 
 def test_it_tells_which_keys_went_down_and_up(window):

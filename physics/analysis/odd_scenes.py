@@ -1,0 +1,92 @@
+"""Warnings of scenes that are probably not what was meant: solids inside others, units mixed up.
+
+A body whose centre begins inside something solid is thrown out: springs give back the energy of the
+whole overlap, impulses push at a bounded speed but have no side to push to. And a mesh in
+millimetres is a thousand times as large as what it is to touch.
+"""
+
+import warnings
+
+import numpy as np
+
+from physics.scene.compound import Compound
+from physics.scene.fidelity import Fidelity
+from physics.scene.mesh import Mesh
+from physics.scene.part import Part
+from physics.scene.scene import Scene
+from physics.scene.shapes import Box, Capsule, Sphere
+from physics.scene.solids import Ground, Static, touch_each_other
+
+Array = np.ndarray
+
+# times as wide as the widest other shape, above which a mesh has other units, most likely;
+# millimetres taken for metres give a thousand
+HUGE = 100.0
+
+
+class OddScene(UserWarning):
+    """A scene that can be simulated, but was hardly meant."""
+
+
+def warn_of_odd_scenes(scene: Scene, fidelity: Fidelity) -> None:
+    """Warns of the body that begins deepest inside a static, and of the mesh that is too large."""
+    for found in (_inside(scene, fidelity), _huge_mesh(scene)):
+        if found:
+            warnings.warn(found, OddScene, stacklevel=3)
+
+
+def _inside(scene: Scene, fidelity: Fidelity) -> str:
+    """What to say of the body whose centre is deepest below a surface; nothing if none is."""
+    if not scene.bodies:
+        return ""
+    centres = np.array([body.position for body in scene.bodies])
+    first = len(scene.bodies) + len(scene.driven_bodies)
+    worst, found = 0.0, (0, 0)
+    for n, static in enumerate(scene.statics):
+        depth = _depth(static, centres)
+        for i in np.flatnonzero(depth > worst):
+            if depth[i] > worst and touch_each_other(scene.bodies[i], static):
+                worst, found = float(depth[i]), (int(i), first + n)
+    if worst == 0.0:
+        return ""
+    body, static_name = (scene.solid_names[k] for k in found)
+    if fidelity.law == "impulse":
+        then = "impulses push it out slowly, or not at all"
+    else:  # all energy of the overlap becomes motion
+        deepest = worst + scene.bodies[found[0]].shape.reach
+        speed = deepest * fidelity.contact_resolution / fidelity.substep
+        then = f"springs throw it out, at up to {speed:.3g} m/s where no material is softer"
+    return (
+        f"the centre of {body} begins {worst:.3g} m below the surface of {static_name}, at "
+        f"position {scene.bodies[found[0]].position} m: {then}; place it outside"
+    )
+
+
+def _depth(static: Ground | Static, points: Array) -> Array:
+    """[n] m by which points [n, 3] m are inside a static; negative outside, and of other shapes."""
+    if isinstance(static, Ground):
+        return np.asarray(static.height - points[:, 2])
+    pose = Part(Sphere(1.0), static.position, static.orientation)
+    local = pose.inward(points)
+    shape = static.shape
+    if isinstance(shape, Compound):
+        return -np.min([part.distance(local) for part in shape.parts], axis=0)
+    if isinstance(shape, Box | Capsule | Sphere):
+        return -Part(shape).distance(local)
+    return np.full(len(points), -1.0)
+
+
+def _huge_mesh(scene: Scene) -> str:
+    """What to say of the mesh of a body that is far wider than all else that moves."""
+    solids = (*scene.bodies, *scene.driven_bodies)
+    widths = [solid.shape.width for solid in solids]
+    if not widths or max(widths) <= HUGE * min(widths):
+        return ""
+    for i in np.argsort(widths)[::-1]:
+        others = [width for k, width in enumerate(widths) if k != i]
+        if isinstance(solids[i].shape, Mesh) and widths[i] > HUGE * max(others):
+            return (
+                f"the Mesh of {scene.solid_names[i]} is {widths[i]:.3g} m wide, the next solid "
+                f"{max(others):.3g} m: vertices are in m; for a file in millimetres use scale=0.001"
+            )
+    return ""
