@@ -6,6 +6,7 @@ millimetres is a thousand times as large as what it is to touch.
 """
 
 import warnings
+from typing import cast
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from physics.scene.fidelity import Fidelity
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
 from physics.scene.scene import Scene
-from physics.scene.shapes import Box, Capsule, Sphere
+from physics.scene.shapes import Box, Capsule, Shape, Sphere
 from physics.scene.solids import Ground, Static, touch_each_other
 
 Array = np.ndarray
@@ -41,24 +42,24 @@ def _inside(scene: Scene, fidelity: Fidelity) -> str:
         return ""
     centres = np.array([body.position for body in scene.bodies])
     first = len(scene.bodies) + len(scene.driven_bodies)
-    worst, found = 0.0, (0, 0)
+    worst, deepest, under = 0.0, 0, 0
     for n, static in enumerate(scene.statics):
         depth = _depth(static, centres)
-        for i in np.flatnonzero(depth > worst):
+        for i in np.flatnonzero(depth > worst).tolist():
             if depth[i] > worst and touch_each_other(scene.bodies[i], static):
-                worst, found = float(depth[i]), (int(i), first + n)
+                worst, deepest, under = float(depth[i]), i, first + n
     if worst == 0.0:
         return ""
-    body, static_name = (scene.solid_names[k] for k in found)
+    body = scene.bodies[deepest]
     if fidelity.law == "impulse":
         then = "impulses push it out slowly, or not at all"
     else:  # all energy of the overlap becomes motion
-        deepest = worst + scene.bodies[found[0]].shape.reach
-        speed = deepest * fidelity.contact_resolution / fidelity.substep
+        overlap = worst + body.shape.reach
+        speed = overlap * fidelity.contact_resolution / fidelity.substep
         then = f"springs throw it out, at up to {speed:.3g} m/s where no material is softer"
     return (
-        f"the centre of {body} begins {worst:.3g} m below the surface of {static_name}, at "
-        f"position {scene.bodies[found[0]].position} m: {then}; place it outside"
+        f"the centre of {scene.solid_names[deepest]} begins {worst:.3g} m below the surface of "
+        f"{scene.solid_names[under]}, at position {body.position} m: {then}; place it outside"
     )
 
 
@@ -70,7 +71,8 @@ def _depth(static: Ground | Static, points: Array) -> Array:
     local = pose.inward(points)
     shape = static.shape
     if isinstance(shape, Compound):
-        return -np.min([part.distance(local) for part in shape.parts], axis=0)
+        parts = cast(tuple[Part, ...], shape.parts)
+        return np.asarray(-np.min([part.distance(local) for part in parts], axis=0))
     if isinstance(shape, Box | Capsule | Sphere):
         return -Part(shape).distance(local)
     return np.full(len(points), -1.0)
@@ -78,13 +80,14 @@ def _depth(static: Ground | Static, points: Array) -> Array:
 
 def _huge_mesh(scene: Scene) -> str:
     """What to say of the mesh of a body that is far wider than all else that moves."""
-    solids = (*scene.bodies, *scene.driven_bodies)
-    widths = [solid.shape.width for solid in solids]
+    shapes: list[Shape] = [body.shape for body in scene.bodies]
+    shapes += [drive.shape for drive in scene.driven_bodies]
+    widths = [shape.width for shape in shapes]
     if not widths or max(widths) <= HUGE * min(widths):
         return ""
     for i in np.argsort(widths)[::-1]:
         others = [width for k, width in enumerate(widths) if k != i]
-        if isinstance(solids[i].shape, Mesh) and widths[i] > HUGE * max(others):
+        if isinstance(shapes[i], Mesh) and widths[i] > HUGE * max(others):
             return (
                 f"the Mesh of {scene.solid_names[i]} is {widths[i]:.3g} m wide, the next solid "
                 f"{max(others):.3g} m: vertices are in m; for a file in millimetres use scale=0.001"

@@ -51,6 +51,7 @@ def recorded(
     envs = make_vector_env(policy.env_id, WORLDS, **kwargs).unwrapped
     if not isinstance(envs, RigidVectorEnv):
         raise UsageError(f"{policy.env_id} has no fidelity: it isn't an environment of rigid-envs")
+    policy.check(envs.single_observation_space)
     observation, _ = envs.reset(seed=seed)
     actions = []
     for _ in range(steps):

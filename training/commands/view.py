@@ -64,9 +64,9 @@ def serve(
         envs = make_vector_env(env_id, num_worlds, **arguments).unwrapped
         if not isinstance(envs, RigidVectorEnv):
             raise UsageError(f"{env_id} cannot be viewed: it isn't an environment of rigid-envs")
-        session = Session(envs.runner, policy.act if policy else None, seed)
         if policy:
-            policy.act(session.observation)  # raises an error if it is for other observations
+            policy.check(envs.single_observation_space)
+        session = Session(envs.runner, policy.act if policy else None, seed)
         return ViewServer(session, host, port, env_id, seed)
     except AddressUnavailable as error:
         raise UsageError(f"{error}; choose another one with --port or --host") from error

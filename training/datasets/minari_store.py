@@ -173,7 +173,8 @@ def write_dataset(
         raise UsageError(f"slowdown is {slowdown}, should be a number from 0 to 1")
     arguments, disturbance = {**policy.env_kwargs, **env_kwargs}, (action_noise, slowdown)
     check_episodes_end(arguments)
-    make_single_env(policy.env_id, **arguments).close()  # reports invalid arguments
+    with closing(make_single_env(policy.env_id, **arguments)) as env:  # reports invalid arguments
+        policy.check(env.observation_space)
     name = dataset_id or default_id(policy.env_id, policy.name, arguments, disturbance)
     if not _NAME.fullmatch(name):
         raise UsageError(

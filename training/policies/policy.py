@@ -1,10 +1,13 @@
 """The interface of a policy, trained or scripted, for evaluation and video."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any
+
+from gymnasium import spaces
 
 from training.scripted import Controller, controller_for
 from training.settings.errors import UsageError
@@ -26,6 +29,33 @@ class Policy:
     """Arguments of the environment that the policy was trained or written for."""
     folder: Path | None = None
     """Folder that holds the policy; None for a scripted one."""
+    shapes: Mapping[str, tuple[int, ...]] | None = None
+    """Of one world's observations that it requires, by key; None if that isn't known."""
+
+    def check(self, space: spaces.Space[Any]) -> None:
+        """Raises UsageError for an environment with other observations, before it is reset.
+
+        Args:
+            space: Of one world's observations.
+        """
+        if self.shapes is None:
+            return
+        parts = dict(space.spaces) if isinstance(space, spaces.Dict) else {}
+        if "state" in parts and "state" not in self.shapes and len(self.shapes["observation"]) == 1:
+            parts["observation"] = parts["state"]  # as `of_state`
+        check_shapes(self.shapes, {name: part.shape or () for name, part in parts.items()})
+
+
+def check_shapes(
+    required: Mapping[str, tuple[int, ...]], given: Mapping[str, tuple[int, ...]]
+) -> None:
+    """Raises UsageError if an observation lacks one of the required shapes."""
+    found = {name: given[name] for name in required if name in given}
+    if found != required:
+        raise UsageError(
+            f"the policy requires observations of shapes {dict(required)}, but the environment "
+            f"has {found}; does it have the same task and arguments as in training?"
+        )
 
 
 def scripted_policy(env_id: str, **env_kwargs: Any) -> Policy:

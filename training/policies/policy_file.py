@@ -27,7 +27,7 @@ from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
 from training.policies.keypoints import keypoints
-from training.policies.policy import Policy, of_state
+from training.policies.policy import Policy, check_shapes, of_state
 from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, nearest
@@ -94,11 +94,7 @@ class PolicyFile:
                 "the observation has no batch axis; add one: "
                 "{key: value[None] for key, value in observation.items()}"
             )
-        if given != header.observation:
-            raise UsageError(
-                f"the policy requires observations of shapes {header.observation}, but the "
-                f"environment has {given}; does it have the same arguments as in training?"
-            )
+        check_shapes(header.observation, given)
         points, parts = header.network.keypoints, []
         names = [header.network.activation] * len(self.layers)
         if header.network.features != "linear":
@@ -230,8 +226,11 @@ def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None
     name = f"{content.header.algorithm} ({path})"
     from_pixels = content.header.network.keypoints is not None
     own = from_pixels or "state" in content.header.observation
-    act = content.act if own else of_state(content.act)
-    return Policy(act, env_id or environment.id, name, env_kwargs, path.parent)
+    act: Any = content.act
+    shapes = content.header.observation
+    if not own:  # where there are pixels, too, the state has another name
+        act = of_state(act)
+    return Policy(act, env_id or environment.id, name, env_kwargs, path.parent, shapes)
 
 
 def _check_installed(path: Path, env_id: str) -> None:

@@ -82,6 +82,7 @@ def evaluate(
     arguments = {**policy.env_kwargs, **env_kwargs}
     check_episodes_end(arguments)
     envs = make_vector_env(policy.env_id, worlds, **arguments)
+    policy.check(envs.single_observation_space)
     start = time.perf_counter()
     rounds = []
     console = Console(quiet=quiet or not sys.stdout.isatty())

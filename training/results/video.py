@@ -59,6 +59,7 @@ def record(
     arguments = {**policy.env_kwargs, **env_kwargs}
     check_episodes_end(arguments)
     env = make_video_env(policy.env_id, arguments)
+    policy.check(env.observation_space)
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())

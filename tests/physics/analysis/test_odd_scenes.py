@@ -88,7 +88,9 @@ def test_the_deepest_is_named():
 
 def cube_mesh(width):
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    return Mesh(vertices=width * (corners - 0.5), convex_hull=True, faces=np.zeros((1, 3), dtype=int))
+    return Mesh(
+        vertices=width * (corners - 0.5), convex_hull=True, faces=np.zeros((1, 3), dtype=int)
+    )
 
 
 def test_a_mesh_in_millimetres():

@@ -1,11 +1,17 @@
 """Policies that come with the package."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import pytest
 
-import rigid_envs  # noqa: F401  (registers the environments)
+from rigid_envs import RigidEnv
+from rigid_envs.episodes.runner import Runner
 from training.commands import cli
+from training.commands.view import serve
 from training.policies.trained_policy import shipped_policy
+from training.results.evaluate import evaluate
+from training.results.video import record
 from training.settings.errors import UsageError
 
 
@@ -29,3 +35,36 @@ def test_it_is_evaluated_by_name(capsys):
     words = ["evaluate", "trained", "--env", "RigidEnvs/Push-v0", "-n", "50"]
     assert cli.main(words) == 0
     assert "trained-Push-v0" in capsys.readouterr().out
+
+
+PLAYS = {
+    "evaluate": lambda policy, _: evaluate(policy, 4),
+    "record": lambda policy, folder: record(policy, folder / "film.gif", episodes=1),
+    "view": lambda policy, _: serve(
+        policy.env_id, policy, num_worlds=1, seed=0, host="127.0.0.1", port=0
+    ),
+}
+
+
+@pytest.mark.parametrize("play", PLAYS)
+def test_a_policy_of_another_task_is_refused_before_anything_is_compiled(
+    play, tmp_path, monkeypatch
+):
+    policy = replace(shipped_policy("RigidEnvs/Push-v0"), env_id="RigidEnvs/Stack-v0")
+
+    def fail(*_):
+        raise AssertionError("an episode was started")
+
+    monkeypatch.setattr(Runner, "reset", fail)
+    with pytest.raises(UsageError, match=r"requires observations of shapes .*\(22,\).*\(43,\)"):
+        PLAYS[play](policy, tmp_path)
+
+
+def test_a_policy_of_the_state_acts_beside_pixels():
+    policy = shipped_policy("RigidEnvs/Push-v0")
+    both = RigidEnv("push", obs_type="pixels+state").observation_space
+    policy.check(both)
+    with pytest.raises(UsageError, match="requires observations"):
+        policy.check(RigidEnv("push", obs_type="pixels").observation_space)
+    with pytest.raises(UsageError, match="requires observations"):
+        policy.check(RigidEnv("push", obs_type="flat").observation_space)
