@@ -30,6 +30,7 @@ help:
 # Installs again only when what is to be installed has changed. Of pip's report it shows a line for
 # each package that is new.
 PIP = install -c constraints.txt --progress-bar off
+PIP_DEV = $(PIP) -c constraints-dev.txt
 SHOW = | awk '/^Collecting/ {print "  " ++n " " $$2} /^Installing collected/ {print "  unpacking"} {fflush()}'
 
 .venv/.created:
@@ -41,14 +42,14 @@ $(DEMO): pyproject.toml constraints.txt | .venv/.created
 	@$(BIN)/python -m pip $(PIP) -e ".[train]" $(SHOW)
 	@touch $@
 
-$(TESTS): $(DEMO)
+$(TESTS): constraints-dev.txt $(DEMO)
 	@echo "installing what the tests need into .venv, about 60 packages more: half a minute"
-	@$(BIN)/python -m pip $(PIP) -e ".[train,render,view,mesh,dev]" $(SHOW)
+	@$(BIN)/python -m pip $(PIP_DEV) -e ".[train,render,view,mesh,dev]" $(SHOW)
 	@touch $@
 
 $(STAMP): $(TESTS)
 	@echo "installing what the documentation needs into .venv"
-	@$(BIN)/python -m pip $(PIP) -e ".[train,render,view,mesh,dev,docs]" $(SHOW)
+	@$(BIN)/python -m pip $(PIP_DEV) -e ".[train,render,view,mesh,dev,docs]" $(SHOW)
 	@touch $@
 
 .venv: $(STAMP)
@@ -92,7 +93,7 @@ stress: $(TESTS)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress $(if $(PART),--part $(PART))
 
 bench: $(TESTS)
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[bench]"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -c constraints-dev.txt -e ".[bench]"
 	$(BIN)/python -m benchmarks
 
 check: $(STAMP) docs

@@ -76,5 +76,5 @@ def _commit() -> str:
     head = git("rev-parse", "--verify", "--short=10", "HEAD")
     if not head:
         return "none"
-    changed = git("status", "--porcelain", "--", "*.py", "pyproject.toml", "constraints.txt")
+    changed = git("status", "--porcelain", "--", "*.py", "pyproject.toml", "constraints*.txt")
     return head + (" with local changes" if changed else "")

@@ -35,8 +35,8 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     """Reads the settings of an algorithm for an environment.
 
     A dense id such as RigidEnvs/PushDense-v0 has the settings of RigidEnvs/Push-v0, if those train
-    with `reward_type: dense` and the file has no entry for the dense id. A registered environment
-    without settings has those of the entry `default`, if there is one.
+    with `reward_type: dense` and the file has no settings of its own for the dense id. A registered
+    environment without settings has those of the entry `default`, if there is one.
 
     Args:
         algo: "ppo" or "sac".
@@ -81,10 +81,17 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
 
 
 def packaged_environments(algo: str) -> list[str]:
-    """Ids of the environments that an algorithm's packaged file has settings for."""
+    """Ids of the environments that an algorithm's packaged file has settings for, sparse or dense.
+
+    Of ids with the same settings, which are aliases in the file, the first one.
+    """
     source = f"configs/{algo}.yaml"
     entries = _read_yaml(CONFIG_FOLDER / f"{algo}.yaml", source)
-    return [name for name in entries if name not in (*SECTIONS, DEFAULT)]
+    return [
+        name
+        for name in entries
+        if name not in (*SECTIONS, DEFAULT) and (name == _entry_of(name, entries))
+    ]
 
 
 def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:
@@ -108,9 +115,13 @@ def parse_settings(words: Sequence[str], source: str) -> dict[str, Any]:
 
 
 def _entry_of(env_id: str, entries: dict[Any, Any]) -> str:
-    """The key of the settings for an environment: its id, or the plain id of a dense one."""
+    """The key of the settings for an environment: its id, or the plain id of a dense one.
+
+    An alias, `RigidEnvs/PushDense-v0: *Push`, is the same object as what it stands for, so that the
+    sections of the plain id hold for it, too.
+    """
     plain = entries.get(plain_id(env_id))
-    if env_id in entries or not isinstance(plain, dict):
+    if entries.get(env_id, plain) is not plain or not isinstance(plain, dict):
         return env_id
     arguments = plain.get("env_kwargs")
     dense = isinstance(arguments, dict) and arguments.get("reward_type") == "dense"

@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from training.settings.algorithms import ALGORITHMS
-from training.settings.config_file import CONFIG_FOLDER, load_config, packaged_environments
+from training.settings.config_file import CONFIG_FOLDER, load_config
+from training.settings.environment_ids import dense_id
 
 ROOT = Path(__file__).parents[3]
 ZOO = """
@@ -52,6 +53,52 @@ print()
 print(json.dumps(found))
 """
 
+BATCHED = """
+import sys
+import numpy as np
+import gymnasium as gym
+import rigid_envs
+from rigid_envs.wrappers import ActionPenalty
+from stable_baselines3.common.env_util import make_vec_env
+from training import zoo
+
+def make(**kwargs):
+    return gym.spec("RigidEnvs/Push-v0").make(**kwargs)
+
+arguments = {"reward_type": "dense", "max_episode_steps": 7, "fidelity": "fast"}
+kinds = [
+    make_vec_env(
+        make, n_envs=4, seed=3, env_kwargs=arguments, vec_env_cls=kind, monitor_dir=folder,
+        wrapper_class=lambda env: ActionPenalty(env, weight=0.1),
+        monitor_kwargs={"info_keywords": ("is_success",)},
+    )
+    for kind, folder in zip((zoo.batched, None), sys.argv[1:])
+]
+seen = [kind.reset() for kind in kinds]
+rng, ended = np.random.default_rng(0), 0
+for _ in range(16):
+    for key in seen[0]:
+        np.testing.assert_array_equal(seen[0][key], seen[1][key])
+    actions = rng.uniform(-1.0, 1.0, (4, 3)).astype(np.float32)
+    steps = [kind.step(actions) for kind in kinds]
+    np.testing.assert_allclose(steps[0][1], steps[1][1], rtol=1e-6)
+    np.testing.assert_array_equal(steps[0][2], steps[1][2])
+    for one, other in zip(steps[0][3], steps[1][3]):
+        if "terminal_observation" in other:
+            ended += 1
+            assert one["TimeLimit.truncated"] and other["TimeLimit.truncated"]
+            assert one["episode"]["l"] == other["episode"]["l"] == 7
+            for key, value in other["terminal_observation"].items():
+                np.testing.assert_array_equal(one["terminal_observation"][key], value)
+    seen = [step[0] for step in steps]
+assert ended == 8
+from gymnasium.wrappers import TransformReward
+try:
+    zoo.batched([lambda: TransformReward(make(), abs)])
+except zoo.UsageError as error:
+    print(error)
+"""
+
 pytestmark = [
     pytest.mark.packaging,
     pytest.mark.skipif(find_spec("rl_zoo3") is None, reason="rl_zoo3 is not installed"),
@@ -61,8 +108,10 @@ pytestmark = [
 def read_with_the_zoo(algo: str, log_folder: Path) -> dict[str, Any]:
     """By environment: the settings as the zoo reads them, and properties of the model."""
     file = CONFIG_FOLDER / f"{algo}.yaml"
+    ids = [name for name in yaml.safe_load(file.read_text()) if name.startswith("RigidEnvs/")]
+    assert {dense_id(name) for name in ids} <= set(ids) or algo != "ppo"
     result = subprocess.run(
-        [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *packaged_environments(algo)],
+        [sys.executable, "-c", ZOO, algo, str(file), str(log_folder), *ids],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -87,3 +136,25 @@ def test_zoo_reads_the_same_settings_and_builds_a_model(algo, tmp_path):
         assert found["env_wrapper"] == (wrapper is not None)
         assert found["gamma"] == own["gamma"]
         assert found["net_arch"] is not None
+
+
+def test_batched_worlds_are_those_of_single_environments(tmp_path):
+    folders = [str(tmp_path / name) for name in ("batched", "single")]
+    result = subprocess.run(
+        [sys.executable, "-c", BATCHED, *folders], cwd=ROOT, capture_output=True, text=True
+    )
+    assert result.returncode == 0, result.stderr
+    assert "env_wrapper is TransformReward, should be one of rigid_envs.wrappers" in result.stdout
+    (log,) = (tmp_path / "batched").glob("*.monitor.csv")
+    assert log.read_text().count(",7,") == 8
+
+
+def test_the_zoo_trains_on_all_worlds_at_once(tmp_path):
+    command = [sys.executable, "-m", "rl_zoo3.train", "--algo", "ppo"]
+    command += ["--env", "RigidEnvs/PushDense-v0", "-conf", str(CONFIG_FOLDER / "ppo.yaml")]
+    command += ["--gym-packages", "rigid_envs", "training.zoo", "-n", "12800", "-f", str(tmp_path)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    (log,) = tmp_path.rglob("*.monitor.csv")  # of one environment; single ones have one each
+    assert log.read_text().count("\n") == 2 + 256
+    assert list(tmp_path.rglob("RigidEnvs-PushDense-v0.zip"))
