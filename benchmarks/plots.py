@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.draw import env_steps, pixels, scenes, tasks, trade
+from benchmarks.draw import env_steps, pixels, scenes, tasks, trade, view, worlds
 from benchmarks.report.provenance import ROOT
 from benchmarks.report.results_file import load
 from benchmarks.report.tables import Table
@@ -32,9 +32,11 @@ class Plot(NamedTuple):
 PLOTS = {
     "env_steps": Plot("worlds", env_steps.draw, ROOT / "docs/images/env_steps.png"),
 }
-# the animation of all tasks, and frames of an episode of each
+# the animations of all tasks and of many worlds, and frames of an episode of each task
 FILM = ROOT / "docs/images/tasks.gif"
+WORLDS = ROOT / "docs/images/worlds.gif"
 SCENES = ROOT / "docs/images/scenes.png"
+VIEW = ROOT / "docs/images/view.png"
 PIXELS = ROOT / "docs/images/pixels.png"
 # plots of docs/trade/trade.csv: their trials
 TRADE = {
@@ -55,7 +57,7 @@ TRADE = {
 
 def run() -> None:
     """Draws all pictures, or those named."""
-    names = [*PLOTS, "trade", "tasks", *tasks.STRIPS, "scenes", "pixels"]
+    names = [*PLOTS, "trade", "tasks", "worlds", *tasks.STRIPS, "scenes", "pixels", "view"]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plots", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(names))
     options = parser.parse_args()
@@ -65,6 +67,10 @@ def run() -> None:
     for name in options.names or names:
         if name == "tasks":
             tasks.draw_film(path := FILM)
+        elif name == "worlds":
+            worlds.draw(path := WORLDS)
+        elif name == "view":
+            view.draw(path := VIEW)
         elif name == "scenes":
             scenes.draw(path := SCENES)
         elif name == "pixels":

@@ -132,6 +132,35 @@ class RigidEnv(gym.Env[Observation, Array]):
         """Where frames and observed pictures are taken from."""
         return self._pictures.camera
 
+    @camera.setter
+    def camera(self, camera: Any) -> None:
+        """Takes the next frames, not observed pixels, from another camera; see the argument."""
+        self._pictures.look(camera)
+
+    def camera_for(self, states: Sequence[dict[str, Any]]) -> Camera:
+        """A camera from the side of the task's that sees some states from as near as it can.
+
+        It sees what moves and goals in all of these states, and in the first one what carries the
+        tool.
+
+        Args:
+            states: from `get_state`, as those of an episode. The environment's own state stays.
+
+        Raises:
+            ValueError: no states, or not such states.
+        """
+        if not states:
+            raise ValueError("states must be at least one, got none")
+        now = self.get_state()
+        try:
+            points = []
+            for n, state in enumerate(states):
+                self.set_state(state)
+                points.append(self._pictures.points(arms=n == 0))
+        finally:
+            self.set_state(now)
+        return self._pictures.fitted(np.concatenate(points))
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:

@@ -3,7 +3,6 @@
 Trained policies of results/ play; the scripted controller builds the tower of three.
 """
 
-from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from PIL import Image
 
-from benchmarks.report.provenance import ROOT
-from training.policies.policy_file import read_policy
+from training.policies.policy import Policy, scripted_policy
+from training.policies.trained_policy import shipped_policy
 from training.results.gif import GifWriter
-from training.results.video import make_video_env
-from training.scripted import controller_for
+from training.results.video import film_episode
+from training.settings.environments import make_single_env
 
 Array = np.ndarray
 
@@ -39,12 +38,12 @@ class Strip(NamedTuple):
 
 
 STRIPS = {
-    "push": Strip("Push", 1_000_008, (0, 6, 12, 20), {}),
+    "push": Strip("Push", 1_000_008, (0, 7, 13, 27), {}),
     "pusht": Strip("PushT", 1_000_009, (0, 12, 30, 60), {}),
     "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),
     "slide": Strip("Slide", 1_000_000, (0, 5, 12, 30), {}),
     "stack": Strip("Stack", 1_000_000, (0, 14, 60, 140), {"blocks": 3}),
-    "throw": Strip("Throw", 1_000_000, (2, 6, 10, 14), {}),
+    "throw": Strip("Throw", 1_000_000, (2, 8, 13, 17), {}),
 }
 SIZE = 360  # pixels of a strip's frame
 
@@ -54,7 +53,7 @@ FILM = (
     {"PushT": 48, "Reach": 12, "Slide": 32},
 )
 FILM_LENGTH = 96
-FILM_SIZE, FILM_FPS, FILM_COLOURS = 260, 25.0, 128
+FILM_SIZE, FILM_FPS, FILM_COLOURS = 250, 25.0, 96
 
 
 def draw_strip(name: str, path: Path) -> None:
@@ -90,30 +89,19 @@ def _film(task: str, steps: int) -> list[Array]:
     return [
         frame
         for k in range(FILM_LENGTH // steps)
-        for frame in list(episode(task, 1_000_000 + k, steps, FILM_SIZE))[1:]
+        for frame in episode(task, 1_000_000 + k, steps, FILM_SIZE)[1:]
     ]
 
 
-def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> Iterator[Array]:
+def episode(task: str, seed: int, steps: int, size: int, **arguments: Any) -> list[Array]:
     """Frames of an episode: one at the start, and one after each step."""
-    env_id, own, act = _player(task, arguments)
-    shown = {"width": size, "height": size, "max_episode_steps": -1}
-    with closing(make_video_env(env_id, {**own, **shown})) as env:
-        observation, _ = env.reset(seed=seed)
-        yield np.asarray(env.render())
-        for _ in range(steps):
-            batch = {name: np.asarray(values)[None] for name, values in observation.items()}
-            action = np.asarray(act(batch))[0].astype(env.action_space.dtype)
-            observation = env.step(action)[0]
-            yield np.asarray(env.render())
+    acting = player(task, arguments)
+    shown = {"width": size, "height": size, "max_episode_steps": -1, "render_mode": "rgb_array"}
+    with closing(make_single_env(acting.env_id, **{**acting.env_kwargs, **shown})) as env:
+        return film_episode(env, acting, seed, steps=steps)
 
 
-def _player(
-    task: str, arguments: dict[str, Any]
-) -> tuple[str, dict[str, Any], Callable[[dict[str, Array]], Any]]:
-    """Id and arguments of the environment, and who acts."""
-    if arguments:
-        env_id = f"RigidEnvs/{task}-v0"
-        return env_id, arguments, controller_for(env_id)
-    policy = read_policy(ROOT / f"results/ppo/RigidEnvs-{task}-v0_seed0/policy.safetensors")
-    return policy.env_id, policy.env_kwargs, policy.act
+def player(task: str, arguments: dict[str, Any]) -> Policy:
+    """Who acts: the scripted controller where there are arguments, else the trained policy."""
+    env_id = f"RigidEnvs/{task}-v0"
+    return scripted_policy(env_id, **arguments) if arguments else shipped_policy(env_id)

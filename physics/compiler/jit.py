@@ -222,6 +222,14 @@ def _without_garbage_collection() -> Iterator[None]:
         gc.enable()
 
 
+_being_compiled: list[str] = []
+
+
+def being_compiled() -> str:
+    """Name of the entry that this process compiles now; empty if none."""
+    return next(iter(_being_compiled[-1:]), "")
+
+
 class _Announcement(event.Listener):
     """Logs when an entry starts to compile, and when it is done; silent if it is in the cache."""
 
@@ -233,12 +241,14 @@ class _Announcement(event.Listener):
         if event.data["dispatcher"] is self._compiled:
             self._start = time.perf_counter()
             name = self._compiled.py_func.__name__
+            _being_compiled.append(name)
             LOGGER.log(self._level, "compiling kernel %r; later runs load it from a cache", name)
 
     def on_end(self, event: Any) -> None:
         if event.data["dispatcher"] is self._compiled:
             seconds = time.perf_counter() - self._start
             name = self._compiled.py_func.__name__
+            _being_compiled.remove(name)
             LOGGER.log(self._level, "compiled kernel %r in %.1f s", name, seconds)
 
 

@@ -175,7 +175,7 @@ class Pixels:
 
     def _draw(self, worlds: Array) -> Array:
         frames = self._renderer.frames(
-            scene_view.items(self._runner, worlds),
+            scene_view.items(self._runner, worlds, observed=True),
             worlds=len(worlds),
             rgb="rgb" in self._kinds,
             depth="depth" in self._kinds,

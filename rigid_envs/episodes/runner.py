@@ -1,12 +1,13 @@
 """The runner: episodes of a task in any number of worlds. Both environments are built on it."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
-from physics import Fidelity, Parameters, Scene, Snapshot, World
+from physics import Fidelity, Parameters, Scene, SimulationDiverged, Snapshot, World
 from physics.scene.fidelity import resolve
 from physics.scene.validation import choice
 from physics.step.kernel_choice import general_is_compiled, requested
@@ -248,6 +249,26 @@ class Runner:
             time=old.time,
         )
         self.world, self._now = new, new.read()
+
+    def prepare_fidelity(self, fidelity: str | Fidelity) -> None:
+        """Compiles what the worlds of another fidelity need; nothing else changes.
+
+        It may be called in another thread than the episodes run in.
+
+        Raises:
+            TypeError, ValueError: no such preset, or a fidelity with which the scene can't be
+                simulated.
+        """
+        old = self.world
+        new = self._worlds(
+            old.scene, fidelity, self.count, old.threads, old.features.per_world_parameters
+        )
+        with suppress(SimulationDiverged):  # of the scene as it begins, which doesn't matter
+            new.advance(self.task.frame)
+        new.read()
+        new.penetration()
+        new.largest_stable_step()
+        new.contacts(0)
 
     @property
     def pixels(self) -> Pixels | None:

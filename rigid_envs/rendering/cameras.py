@@ -20,6 +20,7 @@ FOLLOW = "follow"  # the own camera, which moves along with a place
 NEAR = 0.6  # of its own distance
 AHEAD = 1.0 / 3.0  # where it looks: of the way from the place to the goal
 USED = 0.85  # of the picture, in which both are, or all of a workspace
+FITS = 8  # times that a camera is moved to the middle of what it sees, by perspective a bit less
 LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 
@@ -65,7 +66,13 @@ def choose_camera(given: Any, task: "Task", shape: float = 1.0) -> Camera:
 
 
 def following(
-    own: Camera, place: Array, goal: Array, floor: float = 0.0, shape: float = 1.0
+    own: Camera,
+    place: Array,
+    goal: Array,
+    floor: float = 0.0,
+    shape: float = 1.0,
+    *,
+    body: Array | None = None,
 ) -> Camera:
     """The task's camera, nearer, and moved along with a place; it sees the place and the goal.
 
@@ -75,13 +82,38 @@ def following(
         goal: (3,) m.
         floor: m, height of the ground.
         shape: width over height of the picture.
+        body: (3,) m, what it sees as well, such as a ball that rolls on after it has landed.
     """
     target = place + AHEAD * (goal - place)
     target[2] = max(target[2], floor)
     around, elevation = tuple(target.tolist()), max(own.elevation, LEVEL)
     view = Camera.around(around, 1.0, own.azimuth, elevation, own.field_of_view)
-    distance = max(NEAR * own.distance, _fitting(view, np.array([place, goal]), USED, shape))
+    seen = np.array([place, goal] if body is None else [place, goal, body])
+    distance = max(NEAR * own.distance, _fitting(view, seen, USED, shape))
     return Camera.around(around, distance, own.azimuth, elevation, own.field_of_view)
+
+
+def fitted(own: Camera, points: Array, shape: float = 1.0, used: float = USED) -> Camera:
+    """A camera from the side of another one, so near that it just sees some points.
+
+    Args:
+        own: from whose side, and with whose field of view.
+        points: [n, 3] m.
+        shape: width over height of the picture.
+        used: fraction of the picture within which they are to be.
+    """
+    target = points.mean(axis=0)
+    camera = own
+    for _ in range(FITS):
+        around = tuple(target.tolist())
+        view = Camera.around(around, 1.0, own.azimuth, own.elevation, own.field_of_view)
+        distance = _fitting(view, points, used, shape)
+        camera = Camera.around(around, distance, own.azimuth, own.elevation, own.field_of_view)
+        pixels, _ = camera.project(points, 1, 1)
+        middle = 0.5 * (pixels.min(axis=0) + pixels.max(axis=0)) - 0.5
+        scale = distance / camera.focal_length(1)  # m of a pixel at the target
+        target = target + scale * (middle * (1.0, -1.0)) @ camera.axes[:2]
+    return camera
 
 
 def looking_at(

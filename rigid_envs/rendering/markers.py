@@ -14,7 +14,7 @@ from rigid_envs.rendering.view import Arrow, Ghost, Goal, Mark, Marker
 
 Array = np.ndarray
 
-BALL_OPACITY, GHOST_OPACITY, DISC_OPACITY, RIM_OPACITY = 0.30, 0.27, 0.31, 0.82
+BALL_OPACITY, GHOST_OPACITY, DISC_OPACITY, RIM_OPACITY = 0.40, 0.27, 0.42, 0.90
 STEM, EDGE, SHAFT = 0.002, 1.3, 2.0  # as a share of the distance; pixels; pixels
 HEAD_LENGTH, HEAD_WIDTH = 8.0, 4.0  # pixels, of an arrow
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -10,8 +10,9 @@ import numpy as np
 from physics.scene.validation import choice, instance, integer
 from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.cameras import FOLLOW, choose_camera, following
+from rigid_envs.rendering.cameras import FOLLOW, choose_camera, fitted, following
 from rigid_envs.rendering.renderer import Renderer, grid
+from rigid_envs.rendering.view import Ghost
 from rigid_envs.rendering.window import Window
 
 if TYPE_CHECKING:
@@ -83,6 +84,36 @@ class Pictures:
                 "render_mode; the size of observed pixels is pixel_size=..."
             )
 
+    def points(self, *, arms: bool) -> Array:
+        """[n, 3] m around what pictures of the first world show: solids but statics, and markers.
+
+        Args:
+            arms: whether what carries the drives is among the solids.
+        """
+        scene, ends = self._runner.world.scene, []
+        statics = len(scene.bodies) + len(scene.driven_bodies)
+        for item in scene_view.items(self._runner, np.zeros(1, dtype=np.int64)):
+            if item.solid < statics and (arms or item.opacity == 1.0):
+                ends += _around(item.position[0], np.full(3, item.shape.reach))
+        for marker in scene_view.markers(self._runner, 0):
+            if isinstance(marker, Ghost):
+                ends += _around(marker.position, np.full(3, np.linalg.norm(marker.half_extents)))
+            else:  # and the disc on the ground
+                flat = np.array([marker.radius, marker.radius, 0.0])
+                ends += _around(marker.position, flat)
+                ends += _around(np.array([*marker.position[:2], self._floor or 0.0]), flat)
+        return np.array(ends)
+
+    def look(self, camera: Any) -> None:
+        """Takes the next frames from another camera, given as to `choose_camera`."""
+        self.camera = choose_camera(camera, self._runner.task, self._width / self._height)
+        self._follows = isinstance(camera, str) and camera == FOLLOW
+        self._renderer = None
+
+    def fitted(self, points: Array) -> Camera:
+        """The camera from the side of the task's that just sees some points [n, 3] m."""
+        return fitted(self._runner.task.camera, points, self._width / self._height)
+
     def frames(self) -> tuple[Array, ...]:
         """Pictures [height, width, 3] uint8 of the first worlds."""
         if self._count < self._runner.count and not self._warned:
@@ -141,9 +172,10 @@ class Pictures:
             goals = goals[: self._count, :3]
         else:  # a goal that is no place
             places = goals = engine.read().position[: self._count, 0]
+        bodies = engine.position[: self._count, 0] if engine.scene.bodies else places
         return [
-            following(self.camera, place, goal, self._floor or 0.0, shape)
-            for place, goal in zip(places, goals, strict=True)
+            following(self.camera, place, goal, self._floor or 0.0, shape, body=body)
+            for place, goal, body in zip(places, goals, bodies, strict=True)
         ]
 
     def _frames(self, renderer: Renderer, worlds: Sequence[int]) -> Array:
@@ -159,3 +191,8 @@ class Pictures:
         runner, particles = self._runner, self._show_particles
         arrows = scene_view.forces(runner, world, particles=particles) if self._show_forces else ()
         return scene_view.markers(runner, world), arrows
+
+
+def _around(middle: Array, half: Array) -> list[Array]:
+    """The ends of the axes [6] of an upright ellipsoid."""
+    return [middle + sign * end for end in np.diag(half) for sign in (-1.0, 1.0)]

@@ -1,11 +1,20 @@
 """What a world looks like: its solids, goal and contact forces as items that a renderer draws."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from physics import Box, Capsule, Gripper, Ground, Scene, Sphere, Static
-from rigid_envs.rendering.view import BODY_COLORS, Arrow, Color, Item, Marker, Particles
+from rigid_envs.rendering.view import (
+    BODY_COLORS,
+    OBSERVED_COLORS,
+    Arrow,
+    Color,
+    Item,
+    Marker,
+    Particles,
+)
 
 if TYPE_CHECKING:
     from rigid_envs.episodes.runner import Runner
@@ -14,6 +23,7 @@ Array = np.ndarray
 
 DRIVE_COLOR = (92, 98, 110)
 ARM_COLOR = (150, 156, 166)
+ARM_OPACITY = 0.45
 STATIC_COLOR = (170, 170, 165)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 # m of arrow to a newton
@@ -44,14 +54,19 @@ def floor(scene: Scene) -> Floor:
     return max(grounds, default=Floor(None, -1), key=lambda ground: ground.height or 0.0)
 
 
-def items(runner: "Runner", worlds: Array, *, particles: bool = False) -> list[Item]:
+def items(
+    runner: "Runner", worlds: Array, *, particles: bool = False, observed: bool = False
+) -> list[Item]:
     """Bodies, drives and statics but the ground, and grippers' arms, each in all of some worlds.
 
     Args:
         runner: whose worlds.
         worlds: [n], indices.
         particles: whether to add what the solids touch with.
+        observed: whether policies observe them: in the colours that these have learned from, and
+            with opaque rods and arms, which people see through, as nothing touches them.
     """
+    colors, see_through = (OBSERVED_COLORS, 1.0) if observed else (BODY_COLORS, ARM_OPACITY)
     engine, scene = runner.world, runner.world.scene
     position, orientation = engine.position[worlds], engine.orientation[worlds]
     tools, count = engine.drive_position[worlds], len(worlds)
@@ -67,16 +82,16 @@ def items(runner: "Runner", worlds: Array, *, particles: bool = False) -> list[I
     found = [
         item(
             i, body.shape, position[:, i], orientation[:, i],
-            BODY_COLORS[i % len(BODY_COLORS)], sizes[:, i],
+            colors[i % len(colors)], sizes[:, i],
         )
         for i, body in enumerate(scene.bodies)
     ]  # fmt: skip
-    first = len(scene.bodies)
+    first, arms = len(scene.bodies), list[Item]()
     for i, drive in enumerate(scene.driven_bodies):
         turn = np.tile(drive.orientation, (count, 1))
         found.append(item(first + i, drive.shape, tools[:, i], turn, DRIVE_COLOR))
         if isinstance(drive.shape, Sphere):
-            found.append(_stem(drive.shape.radius, tools[:, i], upright, first + i))
+            arms.append(_stem(drive.shape.radius, tools[:, i], upright, first + i))
     first += len(scene.driven_bodies)
     for i, static in enumerate(scene.statics):
         if isinstance(static, Static):
@@ -87,8 +102,8 @@ def items(runner: "Runner", worlds: Array, *, particles: bool = False) -> list[I
             found.append(item(first + i, static.shape, place, turn, STATIC_COLOR))
     for i, gripper in scene.grippers:
         near = len(scene.bodies) + i
-        found += _arm(gripper, tools[:, i], tools[:, i + 1], upright, near)
-    return found
+        arms += _arm(gripper, tools[:, i], tools[:, i + 1], upright, near)
+    return found + [replace(arm, opacity=see_through) for arm in arms]
 
 
 def markers(runner: "Runner", world: int) -> list[Marker]:

@@ -10,9 +10,11 @@ from physics.scene.validation import positive, unit_quaternion, vector
 Array = np.ndarray
 Color = tuple[int, int, int]
 
-# of a scene's bodies in turn
-BODY_COLORS = ((222, 132, 68), (86, 128, 196), (206, 92, 104), (118, 160, 84), (150, 112, 178))
-GOAL_COLOR = (46, 174, 96)
+# of a scene's bodies in turn: for people, and paler ones in pixels that policies observe, since
+# trained policies know these
+BODY_COLORS = ((236, 106, 30), (36, 104, 216), (214, 50, 72), (124, 164, 36), (136, 78, 200))
+OBSERVED_COLORS = ((222, 132, 68), (86, 128, 196), (206, 92, 104), (118, 160, 84), (150, 112, 178))
+GOAL_COLOR = (24, 168, 84)
 
 
 @dataclass(frozen=True, eq=False)

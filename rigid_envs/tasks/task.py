@@ -40,7 +40,8 @@ class Task(ABC):
         workspace: (low, high) in m of a box around starts and goals, which the cameras "front",
             "side", "back" and "top" show; None if they see them from as far as `camera`.
         video_camera: the name of the camera of recorded videos: "follow" where a body is small
-            compared with its path.
+            compared with its path. If None, it looks from the side of `camera`, so near that it
+            just sees the whole episode, see `RigidEnv.camera_for`.
         size_range: smallest and largest factor of body sizes that `start` supports when each world
             has its own sizes; None if the task supports only the sizes of its scene.
     """
@@ -54,7 +55,7 @@ class Task(ABC):
     reward: Reward
     camera: Camera = Camera()
     workspace: tuple[Point, Point] | None = None
-    video_camera: str = "task"
+    video_camera: str | None = None
     size_range: tuple[float, float] | None = None
 
     @property

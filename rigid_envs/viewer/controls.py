@@ -10,6 +10,7 @@ import viser
 from viser import uplot
 
 from physics.scene.fidelity import PRESETS
+from rigid_envs.viewer.fidelity_change import CUSTOM, FidelityChange, name_of
 from rigid_envs.viewer.scene_nodes import FORCES
 from rigid_envs.viewer.session import Reading, Session
 
@@ -18,11 +19,9 @@ Post = Callable[[Callable[[], None]], None]
 
 SPEEDS: dict[str, float] = {"0.1×": 0.1, "0.25×": 0.25, "1× (real time)": 1.0, "maximal": math.inf}
 REAL_TIME = "1× (real time)"
-CUSTOM = "custom"
 NONE = "–"
 MOST_FRICTION = 2.0  # end of the slider
 SUBSTEPS = (0.1, 20.0)  # ms, ends of the slider
-COMPILES = "Changing the fidelity. The first use of a contact law compiles kernels, in 10 to 30 s."
 BRAND = (46, 150, 96)
 RUN, PAUSE, STEP, RESET = BUTTONS = ("Run", "Pause", "Step", "Reset")
 
@@ -51,6 +50,7 @@ class Controls:
     ) -> None:
         """Adds all controls."""
         self._session, self._post = session, post
+        self._change = FidelityChange(session, post, self._changed)
         self._message = gui.add_markdown("")
         with gui.add_folder("Simulation"):
             self._state = gui.add_markdown("")
@@ -84,6 +84,11 @@ class Controls:
         return SPEEDS[self._speed.value]
 
     @property
+    def ready(self) -> bool:
+        """Whether the session can advance without waiting for a kernel that is compiled."""
+        return self._change.ready
+
+    @property
     def forces(self) -> str:
         """Which forces to draw, one of `FORCES`."""
         return self._forces.value
@@ -98,16 +103,15 @@ class Controls:
         self._message.content = f"> **{_plain(text)}**" if text else ""
 
     def show_settings(self, besides: Any = None) -> None:
-        """Shows the settings that the session has, also after it rejected others.
+        """Shows the settings that the session has or will have, also after it rejected others.
 
         Args:
             besides: the control that keeps what it shows: while a user drags a slider, it is ahead
                 of the session.
         """
-        session, fidelity = self._session, self._session.fidelity
-        names = [name for name, preset in PRESETS.items() if preset == fidelity]
+        session, fidelity = self._session, self._change.target
         shown: list[tuple[Any, Any]] = [
-            (self._preset, names[0] if names else CUSTOM),
+            (self._preset, name_of(fidelity)),
             (self._substep, round(1e3 * fidelity.substep, 3)),
             (self._mass, 1.0 if session.mass is None else session.mass),
             (
@@ -125,10 +129,13 @@ class Controls:
         numbers = session.state()
         rows = [f"| {name} | {value} |" for name, value in numbers.items()]
         self._state.content = "\n".join([f"| step | {session.steps:,} |", "|:--|--:|", *rows])
-        self._costs.content = _cost_table(session.read(), session.before)
+        if self.ready:
+            self._costs.content = _cost_table(session.read(), session.before)
         self._plot.data = _plotted(session)
         if session.error:
             self.say(f"{session.error}. Reset starts new episodes.")
+        elif compiling := self._change.describe():
+            self.say(compiling)
 
     def _connect(self) -> None:
         """Connects what a user does with what the session does.
@@ -154,13 +161,10 @@ class Controls:
 
         def preset(name: str) -> None:
             if name != CUSTOM:
-                self.say(COMPILES)
-                session.change_fidelity(name)
-                session.read()  # compiles, too
-                self.say("")
+                self._change.want(name)
 
         def substep(value: float) -> None:
-            session.change_fidelity(replace(session.fidelity, substep=1e-3 * value))
+            self._change.want(replace(self._change.target, substep=1e-3 * value))
 
         @self._buttons.on_click
         def _(event: viser.GuiEvent) -> None:
@@ -171,6 +175,11 @@ class Controls:
         on_update(self._substep, substep)
         on_update(self._friction, lambda value: session.change_parameters(friction=value))
         on_update(self._mass, lambda value: session.change_parameters(mass=value))
+
+    def _changed(self, error: Exception | None) -> None:
+        """After the fidelity has changed, or if it can't."""
+        self.say("" if error is None else str(error))
+        self.show_settings(besides=None if error else self._substep)
 
     def _try(self, act: Callable[[], None], control: Any = None) -> None:
         """Does what a user wants by a control; shows why if it can't be done."""

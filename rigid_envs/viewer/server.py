@@ -96,7 +96,7 @@ class ViewServer:
         """Advances by the steps that are due; returns when the next one is, in s of the clock."""
         session, speed = self.session, self._controls.speed
         start = time.perf_counter()
-        if session.paused or session.error:
+        if session.paused or session.error or not self._controls.ready:
             return start
         if math.isinf(speed):
             while time.perf_counter() < start + FRAME_TIME:

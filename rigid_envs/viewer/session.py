@@ -90,7 +90,7 @@ class Session:
 
         Settings of the session stay.
         """
-        count = self.runner.count
+        count, self._seed = self.runner.count, seed
         self.runner.reset(np.ones(count, dtype=bool), seed + np.arange(count))
         self._random = np.random.default_rng(seed)
         self.observation, info = self.runner.observe()
@@ -99,6 +99,12 @@ class Session:
         self.success, self.returns = info["is_success"], np.zeros(count)
         self.steps = self.finished = self.solved = 0
         self.return_sum, self.error = 0.0, ""
+
+    def warm_up(self) -> None:
+        """Compiles all that the session uses; its episodes begin again."""
+        self.runner.prepare_fidelity(self.fidelity)
+        self.step()
+        self.reset(self._seed)
 
     def advance(self) -> None:
         """Advances by a step, unless the session is paused or has failed."""

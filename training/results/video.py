@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from rigid_envs.tasks import Task
+from rigid_envs import RigidEnv
 from training.policies.policy import Policy
 from training.results.gif import WIDTH, GifWriter
 from training.settings.environments import check_episodes_end, make_single_env
@@ -20,7 +20,7 @@ from training.settings.seed_ranges import EVALUATION
 
 DEFAULT_FPS = 25
 SUFFIXES = (".mp4", ".gif")
-SHOWN_AFTER_SUCCESS = 1.0
+SHOWN_AFTER_SUCCESS = 0.6
 """s of an episode that are shown after its goal is met for good."""
 
 
@@ -36,7 +36,7 @@ def record(
 ) -> tuple[Path, Path]:
     """Records the episodes with the seeds seed, seed + 1, ... of the single environment.
 
-    An episode is shown until a second after its goal is met for good, or until it ends.
+    An episode is shown until shortly after its goal is met for good, or until it ends.
 
     Args:
         policy: The policy.
@@ -46,7 +46,7 @@ def record(
         quiet: Show no progress.
         gif_width: Width of a GIF in pixels; an mp4 has the size of the frames.
         env_kwargs: Arguments of the environment that replace those of training; without "camera",
-            the camera is `Task.video_camera`.
+            each episode is filmed from `Task.video_camera`.
 
     Returns:
         The paths of the video and of the still image, which shows the middle of the first episode.
@@ -58,34 +58,21 @@ def record(
         raise UsageError(f"number of episodes is {episodes}, should be at least 1")
     arguments = {**policy.env_kwargs, **env_kwargs}
     check_episodes_end(arguments)
-    env = make_video_env(policy.env_id, arguments)
+    env = make_single_env(policy.env_id, **{**arguments, "render_mode": "rgb_array"})
     policy.check(env.observation_space)
+    fits = "camera" not in arguments
     still = video.with_suffix(".png")
     fps = env.metadata.get("render_fps", DEFAULT_FPS)
     console = Console(quiet=quiet or not sys.stdout.isatty())
     with closing(env), video_writer(video, fps, gif_width) as writer:
         for episode in track(range(episodes), "recording", transient=True, console=console):
-            frames = _render_episode(env, policy, seed + episode, round(fps * SHOWN_AFTER_SUCCESS))
+            after = round(fps * SHOWN_AFTER_SUCCESS)
+            frames = film_episode(env, policy, seed + episode, after=after, fits=fits)
             if episode == 0:
                 imageio.imwrite(still, frames[len(frames) // 2])
             for frame in frames:
                 writer.append_data(frame)
     return video, still
-
-
-def make_video_env(env_id: str, arguments: dict[str, Any]) -> gym.Env:
-    """The single environment with frames from `arguments["camera"]`, or the task's video camera.
-
-    Raises:
-        UsageError: As `make_single_env`.
-    """
-    arguments = {**arguments, "render_mode": "rgb_array"}
-    env = make_single_env(env_id, **arguments)
-    task = getattr(env.unwrapped, "task", None)
-    if "camera" in arguments or not isinstance(task, Task) or task.video_camera == "task":
-        return env
-    env.close()
-    return make_single_env(env_id, **arguments, camera=task.video_camera)
 
 
 def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:
@@ -110,17 +97,48 @@ def video_writer(video: Path, fps: float, gif_width: int = WIDTH) -> Any:
     return imageio.get_writer(video, format="FFMPEG", fps=fps, macro_block_size=2)
 
 
-def _render_episode(env: Any, policy: Policy, seed: int, after: int) -> list[np.ndarray]:
-    """Frames of an episode, until `after` steps after its goal is met for good."""
+def film_episode(
+    env: gym.Env,
+    policy: Policy,
+    seed: int,
+    *,
+    steps: int | None = None,
+    after: int | None = None,
+    fits: bool = True,
+) -> list[np.ndarray]:
+    """Frames of an episode: one of its start and one after each step.
+
+    Args:
+        env: A single environment that renders arrays.
+        policy: Who acts.
+        seed: Of the episode.
+        steps: After which the film ends; with the episode if None.
+        after: Number of steps that are shown after the goal is met for good; all if None.
+        fits: Whether an environment of this project is filmed from `Task.video_camera` in place of
+            its own camera.
+    """
+    bare: Any = env.unwrapped
+    own = isinstance(bare, RigidEnv)
+    shown: list[Any] = []  # states of an environment of this project, else frames
     observation, _ = env.reset(seed=seed)
-    frames, unsolved = [env.render()], 0
-    ended = False
+    shown.append(bare.get_state() if own else env.render())
+    unsolved, ended = 1, False
     while not ended:
         batch_of_one = {key: np.asarray(value)[None] for key, value in observation.items()}
         action = np.asarray(policy.act(batch_of_one))[0].astype(env.action_space.dtype)
         observation, _, terminated, truncated, info = env.step(action)
-        frames.append(env.render())
+        shown.append(bare.get_state() if own else env.render())
         if not info.get("is_success", False):
-            unsolved = len(frames)
-        ended = terminated or truncated
-    return frames[: unsolved + after]
+            unsolved = len(shown)
+        ended = terminated or truncated or len(shown) - 1 == steps
+    if after is not None:
+        shown = shown[: unsolved + after]
+    if not own:
+        return shown
+    if fits:
+        bare.camera = bare.task.video_camera or bare.camera_for(shown)
+    frames = []
+    for state in shown:
+        bare.set_state(state)
+        frames.append(bare.render())
+    return frames

@@ -8,7 +8,7 @@ import numpy as np
 from physics import Body, Box, Fidelity, Ground, Material, Readout, Scene, World
 from physics.scene.validation import integer, number
 from rigid_envs.rendering.camera import Camera
-from rigid_envs.rendering.view import BODY_COLORS, Ghost, Marker
+from rigid_envs.rendering.view import BODY_COLORS, GOAL_COLOR, Ghost, Marker
 from rigid_envs.tasks.hand import Hand
 from rigid_envs.tasks.rewards import Reward
 from rigid_envs.tasks.stack.reward import WEIGHTS, reward_terms
@@ -208,15 +208,20 @@ class Stack(Task):
         return reward_terms(cube, self.blocks, self.hand.position(now), opened)
 
     def markers(self, world: World, index: int, goal: Array) -> Sequence[Marker]:
-        """The outline of each cube at its goal, in the colour of the cube."""
+        """The outline of each cube at its goal: in its colour, or green where the cube counts."""
         places = goal[:-1].reshape(-1, 3)
+        away = np.linalg.norm(world.position[index, : self.blocks] - places, axis=1)
+        colors = [
+            GOAL_COLOR if near else BODY_COLORS[i % len(BODY_COLORS)]
+            for i, near in enumerate(away <= THRESHOLD)
+        ]
         size = (
             world.parameters.size[index]
             if world.features.per_world_parameters
             else np.ones(self.blocks)
         )
         halves = np.full((self.blocks, 3), HALF) * size[:, None]
-        return [Ghost(h, p, c) for h, p, c in zip(halves, places, BODY_COLORS, strict=False)]
+        return [Ghost(*one) for one in zip(halves, places, colors, strict=True)]
 
     def _next_cube(self, world: World, now: Readout, achieved: Array, desired: Array) -> NextCube:
         """The cube to place next, given goals [count, goal]."""

@@ -19,7 +19,7 @@ from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.cameras import NAMED, choose_camera, following
 from rigid_envs.rendering.renderer import grid
-from rigid_envs.rendering.view import BODY_COLORS, Mark
+from rigid_envs.rendering.view import BODY_COLORS, GOAL_COLOR, OBSERVED_COLORS, Mark
 from rigid_envs.tasks import Push, PushT, Reach, Slide, Stack, Throw
 from tests.rigid_envs.rollout import (
     IDS,
@@ -273,6 +273,60 @@ def test_a_tower_has_a_ghost_for_each_cube_in_its_colour(blocks):
     np.testing.assert_allclose(heights, 0.02 + 0.04 * np.arange(blocks), atol=1e-6)
 
 
+def test_the_ghost_of_a_cube_is_green_where_the_cube_counts():
+    env = make("RigidEnvs/Stack-v0", blocks=2)
+    env.reset(seed=0)
+    goal = env._runner.goals[0, :6].astype(float).reshape(2, 3)
+    for off, color in ((0.019, GOAL_COLOR), (0.021, BODY_COLORS[1])):
+        env._runner.world.set_state(position=goal + np.array([[0.5, 0.0, 0.0], [0.0, off, 0.0]]))
+        colors = [ghost.color for ghost in scene_view.markers(env._runner, 0)]
+        assert colors == [BODY_COLORS[0], color]
+
+
+def test_people_see_through_what_nothing_touches_and_policies_see_what_they_know():
+    runner = make("RigidEnvs/Stack-v0")._runner
+    seen, observed = (
+        scene_view.items(runner, np.zeros(1, dtype=int), observed=flag) for flag in (False, True)
+    )
+    assert {item.opacity for item in observed} == {1.0}
+    assert [item.color for item in observed[:2]] == list(OBSERVED_COLORS[:2])
+    assert [item.color for item in seen[:2]] == list(BODY_COLORS[:2])
+    assert [item.opacity < 1.0 for item in seen] == [False] * 4 + [True] * 4
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_camera_for_an_episode_just_sees_all_that_moves(env_id):
+    env = make(env_id, render_mode="rgb_array", fidelity="fast")
+    env.reset(seed=1)
+    states = [env.get_state()]
+    for _ in range(6):
+        action = env.action_space.sample()
+        env.step(action)
+        states.append(env.get_state())
+    camera = env.camera_for(states)
+    last = env.get_state()
+    assert all(np.array_equal(last[name], states[-1][name]) for name in ("elapsed", "goals"))
+    ends = []
+    for state in states:
+        env.set_state(state)
+        engine = env._runner.world
+        places = np.concatenate([engine.position[0], engine.drive_position[0]])
+        pixels, depth = camera.project(places, 100, 100)
+        assert (depth > 0.0).all()
+        assert 5.0 < pixels.min() <= pixels.max() < 95.0
+        ends.append(env._pictures.points(arms=state is states[0]))
+    pixels, _ = camera.project(np.concatenate(ends), 100, 100)
+    assert max(50.0 - pixels.min(), pixels.max() - 50.0) == pytest.approx(42.5, abs=0.5)
+    before = env.render()
+    env.camera = camera
+    assert env.camera == camera
+    assert (env.render() != before).any()
+    env.camera = "task"
+    np.testing.assert_array_equal(env.render(), before)
+    with pytest.raises(ValueError, match="states must be at least one"):
+        env.camera_for([])
+
+
 def test_a_cross_shows_where_the_ball_landed_and_stays_there():
     env = make("RigidEnvs/Throw-v0")
     env.reset(seed=0)
@@ -369,6 +423,16 @@ def test_a_following_camera_moves_with_the_ball_of_each_world_until_it_lands():
     assert (moving._runner.world.position[:, 0, 0] > 1.0).all()
     corner = np.s_[:40, :40]  # of the sky and the ground beyond
     np.testing.assert_array_equal(moving.render()[0][corner], landed[0][corner])
+
+
+@pytest.mark.parametrize("away", [0.0, 0.5, 2.0, 6.0])
+def test_a_following_camera_keeps_a_ball_that_rolls_on_in_the_picture(away):
+    landed, goal = np.array([0.9, 0.1, 0.02]), np.array([0.85, 0.05, 0.0])
+    ball = landed + np.array([away, 0.4 * away, 0.0])
+    camera = following(Throw().camera, landed, goal, body=ball)
+    pixels, depth = camera.project(np.array([landed, goal, ball]), 480, 480)
+    assert (depth > 0.0).all()
+    assert 5 < pixels.min() <= pixels.max() < 475
 
 
 @pytest.mark.parametrize("shape", [0.5, 1.0, 2.0])

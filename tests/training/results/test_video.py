@@ -2,16 +2,18 @@
 
 from contextlib import closing
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from PIL import Image
 
 from tests.training.reach import straight_to_the_goal
 from training.policies.policy import Policy, scripted_policy
-from training.results import video as video_module
 from training.results.gif import GifWriter
-from training.results.video import make_video_env, record
+from training.results.video import film_episode, record
+from training.settings.environments import make_single_env
+
+THROW = "RigidEnvs/Throw-v0"
+STILL = Policy(lambda _: np.array([[0.0, 0.0, 0.0, -1.0]], np.float32), THROW, "still")
 
 
 @pytest.fixture
@@ -86,27 +88,51 @@ def test_failure_leaves_no_gif(tmp_path, reach):
 
 
 def test_a_video_of_throw_follows_the_ball_unless_a_camera_is_given(tmp_path):
-    """Also with arguments that the video replaces, and where pixels are observed."""
-    throw = "RigidEnvs/Throw-v0"
-    frames = {}
+    """Also where pixels are observed, which then are the task's camera's."""
+    films = {}
     for name, arguments in {
-        "default": {"render_mode": None},
+        "default": {},
         "follow": {"camera": "follow"},
         "task": {"camera": "task"},
         "pixels": {"obs_type": "pixels", "pixel_size": 16},
     }.items():
-        with closing(make_video_env(throw, {"fidelity": "fast", **arguments})) as env:
-            env.reset(seed=0)
-            frames[name] = env.render()
-    np.testing.assert_array_equal(frames["default"], frames["follow"])
-    np.testing.assert_array_equal(frames["pixels"], frames["follow"])
-    assert (frames["task"] != frames["follow"]).any()
+        size = {"width": 32, "height": 32, "fidelity": "fast"}
+        env = make_single_env(THROW, render_mode="rgb_array", **size, **arguments)
+        with closing(env):
+            films[name] = film_episode(env, STILL, 0, steps=2, fits="camera" not in arguments)
+    np.testing.assert_array_equal(films["default"], films["follow"])
+    np.testing.assert_array_equal(films["pixels"], films["follow"])
+    assert (np.array(films["task"]) != films["follow"]).any()
 
 
-def test_an_environment_of_another_kind_keeps_its_camera(monkeypatch, reach):
-    class Other(gym.Env):
-        task = "a name"
+@pytest.mark.parametrize("forces", [False, True])
+def test_a_film_shows_what_frames_of_the_running_episode_show(forces):
+    size = {"width": 48, "height": 48, "show_forces": forces, "camera": "front"}
+    with closing(make_single_env(THROW, render_mode="rgb_array", fidelity="fast", **size)) as env:
+        film = film_episode(env, STILL, 3, steps=4, fits=False)
+        env.reset(seed=3)
+        frames = [env.render()]
+        for _ in range(4):
+            env.step(STILL.act(None)[0])
+            frames.append(env.render())
+    np.testing.assert_array_equal(film, frames)
 
-    made = Other()
-    monkeypatch.setattr(video_module, "make_single_env", lambda env_id, **arguments: made)
-    assert make_video_env("Other-v0", {}) is made
+
+def test_a_film_ends_shortly_after_success():
+    policy = scripted_policy("RigidEnvs/Push-v0")
+    arguments = {"render_mode": "rgb_array", "width": 16, "height": 16, "fidelity": "fast"}
+    with closing(make_single_env(policy.env_id, **arguments)) as env:
+        whole = film_episode(env, policy, 0)
+        short = film_episode(env, policy, 0, after=5)
+        start = film_episode(env, policy, 0, after=0)
+    assert len(whole) == 51
+    assert len(short) == len(start) + 5 < 51
+
+
+def test_an_environment_of_another_kind_keeps_its_camera(solver, reach):
+    """It has no states: frames are drawn as the episode runs."""
+    with closing(make_single_env(reach, render_mode="rgb_array")) as env:
+        film = film_episode(env, solver, 0, after=0)
+        env.reset(seed=0)
+        np.testing.assert_array_equal(film[0], env.render())
+    assert len(film) > 1
