@@ -16,8 +16,8 @@ from benchmarks.report.tables import plain
 
 # in this order; each is imported when it runs, as some need MuJoCo
 NAMES = (
-    "speed", "worlds", "presets", "startup", "kernels", "memory", "rendering", "pixels", "accuracy",
-    "truths", "classics", "consistency", "features", "flags", "time_control",
+    "speed", "worlds", "presets", "startup", "waiting", "kernels", "memory", "rendering", "pixels",
+    "accuracy", "truths", "classics", "consistency", "features", "flags", "time_control",
 )  # fmt: skip
 WITH_PANDA = ("speed", "worlds", "pixels")  # of these, those that also measure panda-gym
 

@@ -18,7 +18,7 @@ from benchmarks.trade import store
 from benchmarks.trade.trials import TRIALS
 from physics.reference.promises import PROMISES
 
-_DOCS = ("benchmarks", "trade", "stability", "training", "physics")
+_DOCS = ("benchmarks", "trade", "stability", "training", "physics", "quickstart")
 PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in _DOCS))
 RUNS = "runs"  # in place of a table: what the tables of the page were measured on
 SUMMARY, TRIALS_TABLE, PROMISES_TABLE = "summary", "trials", "promises"

@@ -109,8 +109,10 @@ class Hand:
             like: a world with the fidelity to use.
             frame: duration of a step in s.
         """
-        # the sizes are those of the scene; the same features mean no further kernels to compile
-        world = World(scene, like.fidelity, per_world_parameters=like.features.per_world_parameters)
+        # the sizes are those of the scene. With the same kind of kernel and features a general
+        # kernel is that of `like`, and a special one isn't joined by a general one
+        per_world = like.features.per_world_parameters
+        world = World(scene, like.fidelity, per_world_parameters=per_world, kernel=like.kernel)
         closed = np.array(self.home) + np.zeros((2, 3))
         world.move_drives(closed, frame)
         for _ in range(10):

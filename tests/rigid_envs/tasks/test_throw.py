@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from physics import PRESETS as FIDELITIES
-from rigid_envs import Runner
+from rigid_envs import RigidEnv, Runner
+from rigid_envs.tasks import hand
 from rigid_envs.tasks.throw import (
     GRAVITY,
     MAX_TARGET_ANGLE,
@@ -113,3 +114,18 @@ def test_a_scripted_controller_hits(fidelity, stress):
         observation, _, _, truncated, info = envs.step(controller_for(THROW)(observation))
     assert truncated.all()
     assert info["is_success"].mean() >= 0.95
+
+
+def test_the_grasp_is_found_with_the_kind_of_kernel_that_the_worlds_have(monkeypatch):
+    """Another kind would be compiled for it alone, which takes as long as that of the task."""
+    made = []
+
+    class Noted(hand.World):
+        def __init__(self, *arguments, **kwargs):
+            super().__init__(*arguments, **kwargs)
+            made.append(self.kernel)
+
+    monkeypatch.setattr(hand, "World", Noted)
+    for kernel in ("general", "special"):
+        RigidEnv("throw", kernel=kernel).reset(seed=0)
+    assert made == ["general", "special"]
