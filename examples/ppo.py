@@ -1,6 +1,6 @@
 """PPO in one file of plain PyTorch, on a vector environment that simulates all worlds at once.
 
-    python examples/ppo.py                                    # Push, one to two minutes on two idle cores
+    python examples/ppo.py                                    # Push, 1 to 2 minutes on two cores
     python examples/ppo.py --env RigidEnvs/ThrowDense-v0 --gamma 0.97
 
 It is proximal policy optimisation (Schulman et al. 2017) with generalised advantage estimates
