@@ -53,6 +53,7 @@ def test_every_command_has_help(command, capsys):
         ([], "COMMAND"),
         (["trian"], "invalid choice: 'trian'"),
         (["train", "--algo", "pp0"], "did you mean 'ppo'?"),
+        (["train", "--algo", "td3"], "unknown algorithm 'td3'; there are ppo and sac"),
         (
             ["train", "--algo", "sac", "--env", "RigidEnvs/Reach-v0"],
             "no settings for environment 'RigidEnvs/Reach-v0'; there are those of",

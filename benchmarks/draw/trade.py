@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullFormatter
 
 from benchmarks.draw.figure import GRID, INK
@@ -27,8 +28,12 @@ SETTING = {"linewidth": 0.6, "marker": ".", "markersize": 3.5, "alpha": 0.35}
 LEAST = 1e-7  # errors below it are drawn at it
 DPI = 110
 PANEL = (3.1, 2.7)  # inches
-# points by which a preset's name is away from it
-_LABELS = {"fast": (5, 4), "balanced": (4, -10), "accurate": (-14, 6), "solid": (-10, -11)}
+# points by which a preset's name is away from it, and its side that is there
+_LABELS = {
+    "fast": (5, 4, "left"), "balanced": (4, -10, "left"), "accurate": (-4, 5, "right"),
+    "solid": (5, -10, "left"),
+}  # fmt: skip
+_HALO = withStroke(linewidth=2.0, foreground="white")  # around names, which lines cross
 ENGINES = {OURS: "#c8553d", PEER: "#3d6fb6"}
 
 
@@ -103,8 +108,11 @@ def _panel(axes: Axes, rows: Sequence[Row], worlds: str) -> None:
     for row in curves.get((OURS, "presets"), ()):
         x, y = rate(row, worlds), max(row.error, LEAST)
         axes.plot([x], [y], "o", color=INK, markerfacecolor="white", markersize=5, zorder=5)
-        axes.annotate(row.label, (x, y), textcoords="offset points", xytext=_LABELS[row.label],
-                      fontsize=7, color=INK)  # fmt: skip
+        across, up, side = _LABELS[row.label]
+        axes.annotate(
+            row.label, (x, y), textcoords="offset points", xytext=(across, up), ha=side,
+            fontsize=7, color=INK, zorder=6, path_effects=[_HALO],
+        )  # fmt: skip
 
 
 def _points(rows: Sequence[Row], worlds: str) -> tuple[list[float], list[float]]:

@@ -92,10 +92,10 @@ def _kernel(features: Features) -> str:
     """Which kernels there are for a scene, and in what they differ."""
     more = general(features)
     if more is None:
-        return "special, made for this scene; no general kernel has all that it needs"
+        return "compiled for this scene; no general kernel has all that it needs"
     pairs = zip(Features._fields, features, more, strict=True)
     unneeded = [name for name, needs, has in pairs if has is True and not needs]
-    return f"special, or general, which also has: {', '.join(unneeded)}"
+    return f"compiled for this scene, or a general one, which also has: {', '.join(unneeded)}"
 
 
 def _kinds(scene: Scene) -> Scene:

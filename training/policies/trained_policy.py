@@ -15,7 +15,7 @@ from training.settings.algorithms import ALGORITHMS
 from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
 from training.settings.environments import registered_arguments
-from training.settings.errors import UsageError, check_exists, nearest
+from training.settings.errors import UsageError, check_exists, one_of
 
 WITHOUT_REPLAY_BUFFER: dict[str, Any] = {
     "replay_buffer_class": None,
@@ -79,7 +79,7 @@ def trained_policy(
             would have to be unpickled without `trust_pickle`.
     """
     if algo is not None and algo not in ALGORITHMS:
-        raise UsageError(f"unknown algorithm {algo!r}; did you mean {nearest(algo, ALGORITHMS)!r}?")
+        raise UsageError(f"unknown algorithm {algo!r}; {one_of(algo, ALGORITHMS)}")
     check_exists(path, f'a run folder, a {SUFFIX} file, a model.zip, "{SHIPPED}" or "{SCRIPTED}"')
     exported = path / f"policy{SUFFIX}"
     if exported.is_file() and not (path / "run.json").exists():  # as the folders in results/

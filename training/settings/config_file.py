@@ -18,7 +18,7 @@ from training.settings.algorithms import ALGORITHMS
 from training.settings.config import TrainConfig
 from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
-from training.settings.errors import UsageError, check_exists, nearest
+from training.settings.errors import UsageError, check_exists, nearest, one_of
 
 CONFIG_FOLDER = data_folder("configs", "configs")
 """The packaged settings."""
@@ -47,10 +47,7 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
         UsageError: The algorithm, the environment, a key or a value is invalid.
     """
     if algo not in ALGORITHMS:
-        raise UsageError(
-            f"unknown algorithm {algo!r}; did you mean {nearest(algo, ALGORITHMS)!r}? "
-            f"Known: {', '.join(ALGORITHMS)}"
-        )
+        raise UsageError(f"unknown algorithm {algo!r}; {one_of(algo, ALGORITHMS)}")
     source = str(path) if path is not None else f"configs/{algo}.yaml"
     entries = _read_yaml(path if path is not None else CONFIG_FOLDER / f"{algo}.yaml", source)
     key = _entry_of(env_id, entries)

@@ -20,6 +20,17 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return names[lower.index(difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.0)[0])]
 
 
+def one_of(name: str, valid: Iterable[str]) -> str:
+    """What to say of a name that is none of a few valid ones: one that it may be a slip of, or all.
+
+    An algorithm that isn't there is no slip of another one.
+    """
+    names = list(valid)
+    if difflib.get_close_matches(name.lower(), names, n=1):
+        return f"did you mean {nearest(name, names)!r}?"
+    return f"there are {' and '.join(names)}"
+
+
 def check_exists(path: Path, expected: str) -> None:
     """Raises UsageError if there is nothing at `path`; all commands use this wording.
 

@@ -42,9 +42,13 @@ def test_the_sink_at_rest_is_the_one_that_a_world_has():
 
 def test_it_says_which_kernels_there_are():
     lines = Fidelity().explain(CUBE, costs=False).splitlines()
-    assert lines[1].startswith("kernel: special, or general, which also has: slope, lever")
+    assert lines[1].startswith(
+        "kernel: compiled for this scene, or a general one, which also has: slope, lever"
+    )
     ball = Body(Sphere(0.02), mass=0.1, material=Material(rolling_resistance=1e-3))
-    assert "kernel: special, made for" in Fidelity().explain(Scene([ball], [Ground()]), costs=False)
+    assert "kernel: compiled for this scene; no" in Fidelity().explain(
+        Scene([ball], [Ground()]), costs=False
+    )
 
 
 def test_it_names_what_is_modelled_and_what_is_left_out():
