@@ -129,12 +129,14 @@ class RigidEnv(gym.Env[Observation, Array]):
 
     @property
     def camera(self) -> Camera:
-        """Where frames and observed pictures are taken from."""
+        """Where frames are taken from.
+
+        It can be set to what the argument `camera` takes; observed pictures stay as they are.
+        """
         return self._pictures.camera
 
     @camera.setter
     def camera(self, camera: Any) -> None:
-        """Takes the next frames, not observed pixels, from another camera; see the argument."""
         self._pictures.look(camera)
 
     def camera_for(self, states: Sequence[dict[str, Any]]) -> Camera:

@@ -324,10 +324,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         return self._runner.compute_truncated(achieved_goal, info)
 
     def render(self) -> tuple[Array, ...] | None:
-        """A frame [height, width, 3] uint8 of each of the first worlds.
+        """A frame [height, width, 3] uint8 of each world, or of the first `render_worlds`.
 
-        "human" shows them in a grid. Of each world, or of the first `render_worlds`.
-        `rigid_envs.rendering.renderer.grid` tiles the frames.
+        "human" shows them in a grid. `rigid_envs.rendering.renderer.grid` tiles the frames.
         """
         if self.render_mode is None:
             gym.logger.warn('render() needs gym.make_vec(..., render_mode="rgb_array") or "human"')

@@ -40,7 +40,7 @@ def test_a_command_draws_every_picture():
 
 
 def solved(policy, seed, steps=None, **arguments):
-    """Whether the goal is met at the end of an episode, and after which step it was at first."""
+    """Whether the goal is met at the end of an episode, or after some steps."""
     if steps is not None:
         arguments["max_episode_steps"] = steps
     with closing(make_single_env(policy.env_id, **{**policy.env_kwargs, **arguments})) as env:

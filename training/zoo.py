@@ -15,8 +15,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
 from rigid_envs import RigidEnv, RigidVectorEnv
-from rigid_envs.wrappers import vector
-from rigid_envs.wrappers.single import RewardWrapper
+from rigid_envs.wrappers import single, vector
 from training.sb3.vec_env import RigidVecEnv
 from training.settings.errors import UsageError
 
@@ -26,6 +25,12 @@ _OF_GYM_MAKE = (
     gym.wrappers.OrderEnforcing,
     gym.wrappers.TimeLimit,
 )
+# reward wrappers of single environments: those of vector environments
+_REWARDS = {
+    kind: getattr(vector, kind.__name__)
+    for kind in single.RewardWrapper.__subclasses__()
+    if kind.__module__ == single.__name__
+}
 
 
 def batched(env_fns: Sequence[Callable[[], gym.Env]], **kwargs: Any) -> VecEnv:
@@ -33,7 +38,8 @@ def batched(env_fns: Sequence[Callable[[], gym.Env]], **kwargs: Any) -> VecEnv:
 
     Args:
         env_fns: Each makes the same single environment, with wrappers. The first one is called, to
-            see which environment it makes, with which arguments.
+            see which environment it makes, with which arguments; others than `RigidEnv` itself are
+            stepped one after another, as without this module.
         **kwargs: Of `DummyVecEnv`, which environments of others get.
 
     Returns:
@@ -44,28 +50,30 @@ def batched(env_fns: Sequence[Callable[[], gym.Env]], **kwargs: Any) -> VecEnv:
         UsageError: A wrapper that vector environments don't have.
     """
     env = env_fns[0]()
-    if not isinstance(env.unwrapped, RigidEnv):
+    if type(env.unwrapped) is not RigidEnv:
         env.close()
         return DummyVecEnv(list(env_fns), **kwargs)
     spec = env.spec  # of the wrapped one, which knows a limit of steps that replaces the task's
     assert spec is not None
-    arguments = {**spec.kwargs, "max_episode_steps": spec.max_episode_steps}
-    envs: Any = RigidVectorEnv(num_envs=len(env_fns), autoreset_mode="SameStep", **arguments)
+    arguments = {**spec.kwargs, "max_episode_steps": spec.max_episode_steps or -1}
     layers = []
     while isinstance(env, gym.Wrapper):
         layers.append(env)
         env = env.env
-    monitor = None
-    for layer in reversed(layers):
-        if isinstance(layer, Monitor):
-            monitor = layer
-        elif isinstance(layer, RewardWrapper):
-            envs = getattr(vector, type(layer).__name__)(envs, **vars(layer.rule))
-        elif not isinstance(layer, _OF_GYM_MAKE):
+    env.close()
+    for layer in layers:
+        if not isinstance(layer, (Monitor, *_OF_GYM_MAKE)) and type(layer) not in _REWARDS:
             raise UsageError(
                 f"env_wrapper is {type(layer).__name__}, should be one of rigid_envs.wrappers, "
                 "which vector environments have, too; without training.zoo any wrapper will do"
             )
+    envs: Any = RigidVectorEnv(num_envs=len(env_fns), autoreset_mode="SameStep", **arguments)
+    monitor = None
+    for layer in reversed(layers):
+        if isinstance(layer, Monitor):
+            monitor = layer
+        elif isinstance(layer, single.RewardWrapper):
+            envs = _REWARDS[type(layer)](envs, **vars(layer.rule))
     worlds = RigidVecEnv(envs)
     if monitor is None:
         return worlds

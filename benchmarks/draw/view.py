@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from training.commands.view import serve
 from training.policies.policy import scripted_policy
 
 TASK, WORLDS, BLOCKS = "RigidEnvs/Stack-v0", 6, 3
@@ -26,7 +25,9 @@ def draw(path: Path) -> None:
         FileNotFoundError: there is no chromium.
         TimeoutError: the page doesn't get there.
     """
-    from playwright.sync_api import sync_playwright  # an extra
+    from playwright.sync_api import sync_playwright  # this and the next one are of extras
+
+    from training.commands.view import serve
 
     if (program := shutil.which("chromium")) is None:
         raise FileNotFoundError("chromium is missing: apt-get install chromium")

@@ -11,6 +11,7 @@ from typing import cast
 import numpy as np
 
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.fidelity import Fidelity
 from physics.scene.mesh import Mesh
 from physics.scene.part import Part
@@ -46,7 +47,9 @@ def _inside(scene: Scene, fidelity: Fidelity) -> str:
     for n, static in enumerate(scene.statics):
         depth = _depth(static, centres)
         for i in np.flatnonzero(depth > worst).tolist():
-            if depth[i] > worst and touch_each_other(scene.bodies[i], static):
+            body = scene.bodies[i]
+            fits = not isinstance(static, Ground) and _is_hollow(body.shape)
+            if depth[i] > worst and touch_each_other(body, static) and not fits:
                 worst, deepest, under = float(depth[i]), i, first + n
     if worst == 0.0:
         return ""
@@ -61,6 +64,14 @@ def _inside(scene: Scene, fidelity: Fidelity) -> str:
         f"the centre of {scene.solid_names[deepest]} begins {worst:.3g} m below the surface of "
         f"{scene.solid_names[under]}, at position {body.position} m: {then}; place it outside"
     )
+
+
+def _is_hollow(shape: Shape) -> bool:
+    """Whether a shape's centre may be outside of it, so that a static has room there."""
+    if isinstance(shape, Compound):
+        parts = cast(tuple[Part, ...], shape.parts)
+        return bool(min(float(part.distance(np.zeros(3))) for part in parts) >= 0.0)
+    return not isinstance(shape, Box | Capsule | Sphere | Cylinder)
 
 
 def _depth(static: Ground | Static, points: Array) -> Array:
@@ -83,13 +94,13 @@ def _huge_mesh(scene: Scene) -> str:
     shapes: list[Shape] = [body.shape for body in scene.bodies]
     shapes += [drive.shape for drive in scene.driven_bodies]
     widths = [shape.width for shape in shapes]
-    if not widths or max(widths) <= HUGE * min(widths):
+    if len(widths) < 2:
         return ""
-    for i in np.argsort(widths)[::-1]:
-        others = [width for k, width in enumerate(widths) if k != i]
-        if isinstance(shapes[i], Mesh) and widths[i] > HUGE * max(others):
-            return (
-                f"the Mesh of {scene.solid_names[i]} is {widths[i]:.3g} m wide, the next solid "
-                f"{max(others):.3g} m: vertices are in m; for a file in millimetres use scale=0.001"
-            )
-    return ""
+    next_one, widest = sorted(widths)[-2:]
+    i = widths.index(widest)
+    if not isinstance(shapes[i], Mesh) or widest <= HUGE * next_one:
+        return ""
+    return (
+        f"the Mesh of {scene.solid_names[i]} is {widest:.3g} m wide, the next solid {next_one:.3g} "
+        "m: vertices are in m; for a file in millimetres use scale=0.001"
+    )

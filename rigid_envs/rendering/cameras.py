@@ -20,7 +20,7 @@ FOLLOW = "follow"  # the own camera, which moves along with a place
 NEAR = 0.6  # of its own distance
 AHEAD = 1.0 / 3.0  # where it looks: of the way from the place to the goal
 USED = 0.85  # of the picture, in which both are, or all of a workspace
-FITS = 8  # times that a camera is moved to the middle of what it sees, by perspective a bit less
+FITS = 8  # moves of a camera to the middle of what it sees, each of which nearly gets there
 LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 

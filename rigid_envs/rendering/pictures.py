@@ -13,7 +13,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.cameras import FOLLOW, choose_camera, fitted, following
 from rigid_envs.rendering.renderer import Renderer, grid
 from rigid_envs.rendering.view import Ghost
-from rigid_envs.rendering.window import Window
+from rigid_envs.rendering.window import Window, check_display
 
 if TYPE_CHECKING:
     from rigid_envs.episodes.runner import Runner
@@ -76,7 +76,9 @@ class Pictures:
             worlds = IN_WINDOW if mode == "human" else runner.count
         self._count = min(integer("render_worlds", worlds, low=1), runner.count)
         self._renderer: Renderer | None = None
-        self._window = self._make_window() if mode == "human" else None
+        self._window: Window | None = None
+        if mode == "human":
+            check_display()
         self._warned = False
         if mode is None and runner.pixels is not None and (width, height) != (SIZE, SIZE):
             gym.logger.warn(
@@ -94,7 +96,8 @@ class Pictures:
         statics = len(scene.bodies) + len(scene.driven_bodies)
         for item in scene_view.items(self._runner, np.zeros(1, dtype=np.int64)):
             if item.solid < statics and (arms or item.opacity == 1.0):
-                ends += _around(item.position[0], np.full(3, item.shape.reach))
+                reach = item.shape.reach * float(np.max(item.size))
+                ends += _around(item.position[0], np.full(3, reach))
         for marker in scene_view.markers(self._runner, 0):
             if isinstance(marker, Ghost):
                 ends += _around(marker.position, np.full(3, np.linalg.norm(marker.half_extents)))
@@ -125,11 +128,15 @@ class Pictures:
         return self._draw(self._width, self._height)
 
     def show(self) -> None:
-        """Draws the first worlds in a window, as a grid; after `close` in a new one."""
+        """Draws the first worlds in a window, as a grid."""
+        columns = math.ceil(math.sqrt(self._count))
+        share = min(1.0, WINDOW / (columns * self._width))
+        width, height = max(round(share * self._width), 1), max(round(share * self._height), 1)
         if self._window is None:
-            self._window = self._make_window()
+            rows = -(-self._count // columns)
+            title = type(self._runner.task).__name__
+            self._window = Window(columns * width, rows * height, FPS, title)
         if not self._window.closed:
-            columns, width, height = self._tiles
             self._window.show(grid(self._draw(width, height), columns))
 
     def close(self) -> None:
@@ -137,18 +144,6 @@ class Pictures:
         if self._window is not None:
             self._window.close()
         self._window = self._renderer = None
-
-    @property
-    def _tiles(self) -> tuple[int, int, int]:
-        """In a window: frames in a row, and a frame's width and height in pixels."""
-        columns = math.ceil(math.sqrt(self._count))
-        share = min(1.0, WINDOW / (columns * self._width))
-        return columns, max(round(share * self._width), 1), max(round(share * self._height), 1)
-
-    def _make_window(self) -> Window:
-        columns, width, height = self._tiles
-        rows = -(-self._count // columns)
-        return Window(columns * width, rows * height, FPS, type(self._runner.task).__name__)
 
     def _draw(self, width: int, height: int) -> tuple[Array, ...]:
         if self._follows:

@@ -60,7 +60,6 @@ class Window:
     Raises:
         ValueError: a size or rate that is not positive.
         DependencyNotInstalled: pygame is missing.
-        NoDisplay: there is nothing to show a window on.
     """
 
     def __init__(
@@ -73,7 +72,6 @@ class Window:
         self.lines = integer("lines", lines, low=0)
         self.closed = False
         self._pygame = load_pygame()
-        _check_display(self._pygame)
         self._surface: Any = None
         self._clock: Any = None
 
@@ -86,6 +84,9 @@ class Window:
 
         Returns:
             The keys that went down or up since the last picture, in order.
+
+        Raises:
+            NoDisplay: there is none.
         """
         if self.closed:
             return []
@@ -110,6 +111,7 @@ class Window:
         self._surface, self.closed = None, True
 
     def _open(self) -> None:
+        check_display()
         self._pygame.display.init()
         room = LINE_HEIGHT * self.lines + (LINE_HEIGHT // 2 if self.lines else 0)
         self._surface = self._pygame.display.set_mode((self.width, self.height + room))
@@ -136,8 +138,9 @@ class Window:
         return found
 
 
-def _check_display(pygame: Any) -> None:
+def check_display() -> None:
     """Raises NoDisplay where no window could be opened; windows that are open stay open."""
+    pygame = load_pygame()
     if pygame.display.get_init():
         return
     try:

@@ -51,6 +51,7 @@ class Controls:
         """Adds all controls."""
         self._session, self._post = session, post
         self._change = FidelityChange(session, post, self._changed)
+        self._held: list[Callable[[], None]] = []  # what a user does before the session is ready
         self._message = gui.add_markdown("")
         with gui.add_folder("Simulation"):
             self._state = gui.add_markdown("")
@@ -82,6 +83,10 @@ class Controls:
     def speed(self) -> float:
         """Simulated seconds per second of wall time that the user wants, inf for the most."""
         return SPEEDS[self._speed.value]
+
+    def start(self) -> None:
+        """Compiles what the session needs; until then its worlds stand still."""
+        self._change.start()
 
     @property
     def ready(self) -> bool:
@@ -126,11 +131,13 @@ class Controls:
     def show_numbers(self) -> None:
         """Shows rewards, episodes, and what the present setting costs and gains."""
         session = self._session
+        if not self.ready:
+            self.say(self._change.describe())
+            return
         numbers = session.state()
         rows = [f"| {name} | {value} |" for name, value in numbers.items()]
         self._state.content = "\n".join([f"| step | {session.steps:,} |", "|:--|--:|", *rows])
-        if self.ready:
-            self._costs.content = _cost_table(session.read(), session.before)
+        self._costs.content = _cost_table(session.read(), session.before)
         self._plot.data = _plotted(session)
         if session.error:
             self.say(f"{session.error}. Reset starts new episodes.")
@@ -180,9 +187,15 @@ class Controls:
         """After the fidelity has changed, or if it can't."""
         self.say("" if error is None else str(error))
         self.show_settings(besides=None if error else self._substep)
+        held, self._held = self._held, []
+        for act in held:
+            act()
 
     def _try(self, act: Callable[[], None], control: Any = None) -> None:
         """Does what a user wants by a control; shows why if it can't be done."""
+        if not self.ready and control not in (self._preset, self._substep):
+            self._held.append(lambda: self._try(act, control))
+            return
         self.say("")
         try:
             act()

@@ -18,7 +18,8 @@ class FidelityChange:
 
     A thread compiles what it needs, in 10 to 70 s where nothing has been compiled before, in
     milliseconds where all has. Then the loop of the server changes to it. Of several wishes in the
-    meantime only the last one counts. All methods are for the thread of the loop.
+    meantime only the last one counts. All methods are for the thread of the loop. Until `ready`
+    nothing else may touch the session, because the thread tries out a step of it.
 
     Attributes:
         ready: whether the session can advance: its own kernels are there.
@@ -40,7 +41,10 @@ class FidelityChange:
         self._wanted: Fidelity | None = None
         self._prepared: Fidelity | None = None  # by the thread, if it runs
         self._since = 0.0
-        self.want(session.fidelity)
+
+    def start(self) -> None:
+        """Compiles what the session itself needs."""
+        self.want(self._session.fidelity)
 
     @property
     def target(self) -> Fidelity:
@@ -49,7 +53,7 @@ class FidelityChange:
 
     def want(self, fidelity: str | Fidelity) -> None:
         """Changes to a fidelity as soon as its kernels are there."""
-        self._wanted, self._since = resolve(fidelity), time.perf_counter()
+        self._wanted = resolve(fidelity)
         if self._prepared is None:
             self._prepare(self._wanted)
 
@@ -72,15 +76,17 @@ class FidelityChange:
                     self._session.runner.prepare_fidelity(fidelity)
                 else:
                     self._session.warm_up()
-            except (TypeError, ValueError) as caught:
+            except Exception as caught:  # raised again by the loop, if it isn't a user's mistake
                 error = caught
             self._post(lambda: self._finish(fidelity, error))
 
-        self._prepared = fidelity
+        self._prepared, self._since = fidelity, time.perf_counter()
         threading.Thread(target=run, name="compiling", daemon=True).start()
 
     def _finish(self, fidelity: Fidelity, error: Exception | None) -> None:
         self._prepared, self.ready = None, True
+        if error is not None and not isinstance(error, TypeError | ValueError):
+            raise error
         if self._wanted is not None and fidelity != self._wanted:
             self._prepare(self._wanted)
             return

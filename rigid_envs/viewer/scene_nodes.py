@@ -59,9 +59,10 @@ class SceneNodes:
             forces: one of `FORCES`.
             goals: whether to show the markers of the goals.
         """
-        opacity = None if forces == FORCES[0] else GLASS
+        opacity = 1.0 if forces == FORCES[0] else GLASS
         for node, solid in zip(self._nodes, self._solids(), strict=True):
-            node.opacity = opacity
+            least = min(opacity, solid.opacity)
+            node.opacity = None if least == 1.0 else least
             node.batched_positions = solid.position + self._offsets
             node.batched_wxyzs = _wxyz(solid)
             scales = _scales(solid)

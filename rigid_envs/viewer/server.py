@@ -72,6 +72,7 @@ class ViewServer:
         Nothing advances while no browser is connected. Call `close` afterwards.
         """
         stop = stop or threading.Event()
+        self._controls.start()
         next_step = next_numbers = time.perf_counter()
         while not stop.is_set():
             if not self._server.get_clients():
@@ -81,7 +82,8 @@ class ViewServer:
             shown = time.perf_counter()
             next_step = self._advance(next_step)
             with self._server.atomic():
-                self._nodes.update(self._controls.forces, self._controls.goals)
+                if self._controls.ready:
+                    self._nodes.update(self._controls.forces, self._controls.goals)
                 if time.perf_counter() >= next_numbers:
                     self._controls.show_numbers()
                     next_numbers = time.perf_counter() + NUMBERS_TIME

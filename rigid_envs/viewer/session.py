@@ -156,6 +156,7 @@ class Session:
         """
         if resolve(fidelity) == self.fidelity:
             return
+        self._timed = np.nan, 0  # what was timed while kernels were compiled doesn't count
         reading = self._reading_to_keep()
         self.runner.change_fidelity(fidelity)
         self._begin_setting(reading)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_envs.rendering.window import Key, NoDisplay, Window, load_pygame
+from rigid_envs.rendering.window import Key, NoDisplay, Window, check_display, load_pygame
 from training.settings.environments import make_single_env
 from training.settings.errors import UsageError
 
@@ -137,8 +137,9 @@ def play(env_id: str, *, seed: int | None = None, fps: float = 25.0, **env_kwarg
     arguments = {"max_episode_steps": -1, "width": SIZE, "height": SIZE, **env_kwargs}
     env = make_single_env(env_id, render_mode="rgb_array", **arguments)
     width, height, played = arguments["width"], arguments["height"], 0
+    window = Window(width, height, fps, f"{env_id}: play", len(HELP) + 1)
     try:
-        window = Window(width, height, fps, f"{env_id}: play", len(HELP) + 1)
+        check_display()
     except NoDisplay:
         raise UsageError("cannot open a window: there is no display") from None
     with closing(env), closing(window):

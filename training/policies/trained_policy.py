@@ -158,9 +158,11 @@ def _unpickled(
 
     observed = model.observation_space
     own = isinstance(observed, spaces.Dict) and "state" in observed.spaces
-    return Policy(
-        act if own else of_state(act), env_id, f"{algo} ({file})", env_kwargs, folder.path
-    )
+    shapes = None
+    if isinstance(observed, spaces.Dict):
+        shapes = {name: part.shape or () for name, part in observed.spaces.items()}
+    name = f"{algo} ({file})"
+    return Policy(act if own else of_state(act), env_id, name, env_kwargs, folder.path, shapes)
 
 
 def _load_model(file: Path, algo: str, device: str) -> Any:

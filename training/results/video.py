@@ -114,8 +114,8 @@ def film_episode(
         seed: Of the episode.
         steps: After which the film ends; with the episode if None.
         after: Number of steps that are shown after the goal is met for good; all if None.
-        fits: Whether an environment of this project is filmed from `Task.video_camera` in place of
-            its own camera.
+        fits: Whether an environment of this project is filmed from `Task.video_camera`; its camera
+            is that of the task afterwards.
     """
     bare: Any = env.unwrapped
     own = isinstance(bare, RigidEnv)
@@ -141,4 +141,6 @@ def film_episode(
     for state in shown:
         bare.set_state(state)
         frames.append(bare.render())
+    if fits:
+        bare.camera = None
     return frames

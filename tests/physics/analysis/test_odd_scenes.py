@@ -19,6 +19,7 @@ from physics import (
     Scene,
     Sphere,
     Static,
+    Torus,
 )
 from physics.analysis.odd_scenes import OddScene, warn_of_odd_scenes
 
@@ -103,3 +104,13 @@ def test_a_mesh_in_millimetres():
     assert not found(Scene(bodies=[other, fits], statics=[Ground()]))
     terrain = Static(cube_mesh(60.0), position=(0.0, 0.0, -40.0))
     assert not found(Scene(bodies=[other, fits], statics=[terrain]))
+
+
+def test_a_ring_around_a_peg_is_fine():
+    sides = [Part(Box((0.1, 0.01, 0.02)), (0.0, y, 0.0)) for y in (-0.1, 0.1)]
+    sides += [Part(Box((0.01, 0.1, 0.02)), (x, 0.0, 0.0)) for x in (-0.1, 0.1)]
+    peg = Static(Capsule(0.02, 0.3))
+    assert not found(one(0.1, [peg], shape=Compound(sides)))
+    assert not found(one(0.1, [peg], shape=Torus(0.1, 0.02)))
+    assert found(one(-0.1, [Ground()], shape=Torus(0.1, 0.02)))
+    assert found(one(0.1, [peg], shape=Compound([Part(CUBE)])))

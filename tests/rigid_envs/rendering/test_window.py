@@ -42,7 +42,7 @@ def test_without_a_display_there_is_no_window(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
     with pytest.raises(NoDisplay, match="there is no display; render_mode="):
-        Window(64, 48)
+        Window(64, 48).show(PICTURE)
 
 
 def test_an_environment_without_a_display_is_refused_before_anything_is_compiled(monkeypatch):

@@ -6,6 +6,7 @@ import threading
 import pytest
 
 from physics import PRESETS, Fidelity
+from physics.compiler import jit
 from rigid_envs import Runner
 from rigid_envs.viewer import fidelity_change
 from rigid_envs.viewer.fidelity_change import FidelityChange, name_of
@@ -28,6 +29,7 @@ class Loop:
 
         monkeypatch.setattr(self.session.runner, "prepare_fidelity", prepare)
         self.change = FidelityChange(self.session, self.posted.put, self.results.append)
+        self.change.start()
 
     def finish(self):
         """The compiler is done; the loop does what is posted."""
@@ -86,6 +88,34 @@ def test_what_cannot_be_simulated_is_said_and_changes_nothing(monkeypatch):
     loop.posted.get(timeout=120.0)()
     assert "too long" in str(loop.results[-1])
     assert loop.session.fidelity == loop.change.target == PRESETS["fast"]
+
+
+def test_a_bug_ends_the_loop_and_isnt_waited_for(monkeypatch):
+    loop = Loop(monkeypatch)
+    loop.finish()
+
+    def fail(_):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(loop.session.runner, "prepare_fidelity", fail)
+    loop.change.want("solid")
+    with pytest.raises(RuntimeError, match="a bug"):
+        loop.posted.get(timeout=120.0)()
+    assert loop.change.describe() == ""
+
+
+def test_after_preparing_a_change_compiles_nothing(monkeypatch):
+    session = Session(Runner("push", 2, fidelity="fast", reward_type="dense"))
+    session.warm_up()
+    assert session.steps == 0
+    session.runner.prepare_fidelity("solid")
+    started = []
+    monkeypatch.setattr(jit.LOGGER, "log", lambda *arguments: started.append(arguments))
+    session.change_fidelity("solid")
+    session.step()
+    session.read()
+    session.runner.world.contacts(0)
+    assert not started
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -93,10 +93,33 @@ for _ in range(16):
     seen = [step[0] for step in steps]
 assert ended == 8
 from gymnasium.wrappers import TransformReward
-try:
-    zoo.batched([lambda: TransformReward(make(), abs)])
-except zoo.UsageError as error:
-    print(error)
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+class Own(ActionPenalty):
+    pass
+
+class OwnEnv(rigid_envs.RigidEnv):
+    pass
+
+for wrap in (lambda env: TransformReward(env, abs), lambda env: Own(env, weight=0.1)):
+    try:
+        zoo.batched([lambda: wrap(make())])
+    except zoo.UsageError as error:
+        print(error)
+assert isinstance(zoo.batched([lambda: OwnEnv("reach")]), DummyVecEnv)
+endless = zoo.batched([lambda: gym.make("RigidEnvs/Push-v0", max_episode_steps=-1)] * 2)
+endless.reset()
+assert not any(endless.step(np.zeros((2, 3)))[2].any() for _ in range(60))
+kinds = [
+    VecNormalize(make_vec_env(make, n_envs=3, seed=1, env_kwargs=arguments, vec_env_cls=kind))
+    for kind in (zoo.batched, None)
+]
+seen = [kind.reset() for kind in kinds]
+for _ in range(9):
+    for key in seen[0]:
+        np.testing.assert_allclose(seen[0][key], seen[1][key], rtol=1e-6)
+    actions = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+    seen = [kind.step(actions)[0] for kind in kinds]
 """
 
 pytestmark = [
@@ -144,7 +167,8 @@ def test_batched_worlds_are_those_of_single_environments(tmp_path):
         [sys.executable, "-c", BATCHED, *folders], cwd=ROOT, capture_output=True, text=True
     )
     assert result.returncode == 0, result.stderr
-    assert "env_wrapper is TransformReward, should be one of rigid_envs.wrappers" in result.stdout
+    for name in ("TransformReward", "Own"):
+        assert f"env_wrapper is {name}, should be one of rigid_envs.wrappers" in result.stdout
     (log,) = (tmp_path / "batched").glob("*.monitor.csv")
     assert log.read_text().count(",7,") == 8
 
