@@ -106,21 +106,25 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         self.render_mode = render_mode
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
-        self._runner = Runner(
-            make_task(task, arguments, argument_names(RigidVectorEnv)),
-            self.num_envs,
-            reward_type,
-            fidelity,
-            threads,
-            max_episode_steps,
-            terminate_on_success,
-            randomize,
-            observe_parameters,
-            observe_task_guide,
-            pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
-            kernel,
-            obs_type == "flat",
-        )
+        own = make_task(task, arguments, argument_names(RigidVectorEnv))
+        try:
+            self._runner = Runner(
+                own,
+                self.num_envs,
+                reward_type,
+                fidelity,
+                threads,
+                max_episode_steps,
+                terminate_on_success,
+                randomize,
+                observe_parameters,
+                observe_task_guide,
+                pixel_settings(obs_type, pixels, pixel_size, frame_stack, camera),
+                kernel,
+                obs_type == "flat",
+            )
+        except MemoryError as error:
+            raise MemoryError(f"num_envs={self.num_envs}: {error}") from None
         self._pictures = Pictures(
             self._runner,
             render_mode,

@@ -101,7 +101,7 @@ def test_every_command_has_help(command, capsys):
         (["scripted", "--env-kwargs", "blocks:3"], "unknown argument 'blocks'"),
         (
             ["train", "--n-envs", "100000000", "-n", "10000000000"],
-            "RigidEnvs/Push-v0: 100000000 worlds of this scene need",
+            "RigidEnvs/Push-v0: num_envs=100000000: 100000000 worlds of this scene need",
         ),
         (
             ["scripted", "--env-kwargs", "obstacles:many"],

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from rigid_envs.rendering.markers import box_corners
-from rigid_envs.rendering.view import Color, Ghost, Goal, Mark, Marker
+from rigid_envs.rendering.view import Ghost, Goal, Mark, Marker
 from rigid_envs.viewer.triangles import Triangles, cylinder, rounded
 
 Array = np.ndarray
@@ -46,7 +46,7 @@ KINDS = {
 
 
 class MarkerNodes:
-    """Shows markers: one node for all of a kind and colour.
+    """Shows markers: one node for all of a kind.
 
     Args:
         scene: of the page.
@@ -55,7 +55,7 @@ class MarkerNodes:
     def __init__(self, scene: viser.SceneApi) -> None:
         """Adds nothing yet."""
         self._scene = scene
-        self._nodes: dict[tuple[str, Color], tuple[Array, Any]] = {}
+        self._nodes: dict[str, tuple[Array, Any]] = {}
         self._edges: tuple[Array, Any] | None = None
 
     def update(self, markers: list[tuple[Marker, Array]]) -> None:
@@ -64,51 +64,50 @@ class MarkerNodes:
         Args:
             markers: each with the place [3] m of its world.
         """
-        found: dict[tuple[str, Color], list[Array]] = {}
+        found: dict[str, list[Array]] = {}
         edges, colors = [], []
         for marker, place in markers:
             for kind, position, size in _parts(marker):
                 turn = marker.orientation if isinstance(marker, Ghost) else _UPRIGHT
-                row = np.concatenate([position + place, size, np.roll(turn, 1)])
-                found.setdefault((kind, marker.color), []).append(row)
+                row = np.concatenate([position + place, size, np.roll(turn, 1), marker.color])
+                found.setdefault(kind, []).append(row)
             if isinstance(marker, Ghost):
                 corners = box_corners(marker) + place
                 edges.append(corners[list(EDGES)].reshape(-1, 2, 3))
                 colors.append(np.broadcast_to(np.array(marker.color), (len(EDGES) // 2, 2, 3)))
-        for key in [key for key in self._nodes if key not in found]:
-            self._nodes.pop(key)[1].remove()
-        for key, rows in found.items():
-            self._show(key, np.array(rows))
+        for kind in [kind for kind in self._nodes if kind not in found]:
+            self._nodes.pop(kind)[1].remove()
+        for kind, rows in found.items():
+            self._show(kind, np.array(rows))
         self._show_edges(edges, colors)
 
-    def _show(self, key: tuple[str, Color], rows: Array) -> None:
-        """Shows markers of a kind and colour at rows [n, 10] of position, size and w, x, y, z."""
-        old = self._nodes.get(key)
+    def _show(self, name: str, rows: Array) -> None:
+        """Shows markers of a kind: rows [n, 13] of position, size, w, x, y, z, and colour."""
+        old, colors = self._nodes.get(name), rows[:, 10:].astype(np.uint8)
         if old is not None and np.array_equal(old[0], rows):
             return
         if old is not None and len(old[0]) == len(rows):
             node = old[1]
             node.batched_positions, node.batched_scales = rows[:, :3], rows[:, 3:6]
-            node.batched_wxyzs = rows[:, 6:]
+            node.batched_wxyzs, node.batched_colors = rows[:, 6:10], colors
         else:
             if old is not None:
                 old[1].remove()
-            name, color = key
             kind = KINDS[name]
             node = self._scene.add_batched_meshes_simple(
-                f"/{name} {color}",
+                f"/{name}",
                 kind.mesh.vertices,
                 kind.mesh.faces,
-                rows[:, 6:],
+                rows[:, 6:10],
                 rows[:, :3],
                 batched_scales=rows[:, 3:6],
-                batched_colors=color,
+                batched_colors=colors,
                 opacity=kind.opacity,
                 lod="off",
                 cast_shadow=False,
                 receive_shadow=False,
             )
-        self._nodes[key] = rows, node
+        self._nodes[name] = rows, node
 
     def _show_edges(self, edges: list[Array], colors: list[Array]) -> None:
         if not edges:
@@ -117,16 +116,17 @@ class MarkerNodes:
             self._edges = None
             return
         points = np.concatenate(edges)
-        if self._edges is not None and np.array_equal(self._edges[0], points):
+        shown = np.concatenate([points, np.concatenate(colors)], axis=2)
+        if self._edges is not None and np.array_equal(self._edges[0], shown):
             return
         node = self._scene.add_line_segments(
             "/ghost edges",
             points,
-            np.concatenate(colors).astype(np.uint8),
+            shown[:, :, 3:].astype(np.uint8),
             thickness=1.5,
             thickness_units="screen",
         )
-        self._edges = points, node
+        self._edges = shown, node
 
 
 def _parts(marker: Marker) -> list[tuple[str, Array, Array]]:

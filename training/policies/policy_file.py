@@ -31,6 +31,7 @@ from training.policies.policy import Policy, check_shapes, of_state
 from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, nearest
+from training.settings.tasks import check_same_task
 
 SUFFIX = ".safetensors"
 FORMAT = 2
@@ -222,6 +223,7 @@ def read_policy(path: Path | str, *, algo: str | None = None, env_id: str | None
     if env_id is None:
         _check_installed(path, environment.id)
     elif env_id != environment.id:
+        check_same_task(environment.id, env_id, str(path))
         env_kwargs = {**env_kwargs, **registered_arguments(env_id)}
     name = f"{content.header.algorithm} ({path})"
     from_pixels = content.header.network.keypoints is not None
@@ -249,8 +251,9 @@ def _check_installed(path: Path, env_id: str) -> None:
         )
     known = [name for name in gym.registry if name.startswith("RigidEnvs/")]
     raise UsageError(
-        f"{path} was trained on {env_id!r}, which is not installed; "
-        f"did you mean --env {nearest(env_id, known)}?"
+        f"{path} was trained on {env_id!r}, which is not registered; for a task of your own call "
+        "training.commands.cli.main([...]) with the words of the command in the script that "
+        f"registers it; or did you mean --env {nearest(env_id, known)}?"
     )
 
 

@@ -16,6 +16,7 @@ from training.settings.data_folders import data_folder
 from training.settings.environment_ids import plain_id
 from training.settings.environments import registered_arguments
 from training.settings.errors import UsageError, check_exists, one_of
+from training.settings.tasks import check_same_task
 
 WITHOUT_REPLAY_BUFFER: dict[str, Any] = {
     "replay_buffer_class": None,
@@ -95,7 +96,7 @@ def trained_policy(
                     f"{path} has no checkpoint yet: {folder.policy.name} is missing"
                     + (_trust_hint(folder.model) if folder.model.exists() else "")
                 )
-            found = read_policy(folder.policy, algo=config.algo, env_id=env_id or config.env_id)
+            found = read_policy(folder.policy, algo=config.algo, env_id=env_id)
             return replace(found, name=f"{config.algo} ({path})", folder=path)
         return _unpickled(folder.model, algo, env_id, deterministic, device, trust_pickle)
     if path.suffix not in (SUFFIX, ".zip"):
@@ -141,6 +142,7 @@ def _unpickled(
             raise UsageError(f"{file} was trained with {config.algo}, not with {algo!r}")
         algo, env_kwargs = config.algo, config.final_env_kwargs
         if env_id not in (None, config.env_id):
+            check_same_task(config.env_id, env_id, str(file))
             env_kwargs = {**env_kwargs, **registered_arguments(env_id)}
         env_id = env_id or config.env_id
     if algo is None or env_id is None:

@@ -60,8 +60,12 @@ def load_config(algo: str, env_id: str, path: Path | None = None) -> TrainConfig
     if key not in entries:
         names = [str(name) for name in entries]
         raise UsageError(
-            f"{source}: no settings for environment {env_id!r}; "
-            + ("" if env_id in gym.registry else f"did you mean {nearest(env_id, names)!r}? ")
+            f"{source}: no settings for environment {env_id!r}"
+            + (
+                "; "
+                if env_id in gym.registry
+                else f", which isn't registered; did you mean {nearest(env_id, names)!r}? "
+            )
             + f"there are those of {', '.join(names)}; "
             + ("HER needs the sparse reward; " if algo == "sac" and "Dense" in env_id else "")
             + "to use your own settings: --config FILE"

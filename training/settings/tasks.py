@@ -10,6 +10,7 @@ import gymnasium as gym
 import rigid_envs  # noqa: F401  (registers the ids)
 from rigid_envs.tasks import TASKS
 from training.settings.environment_ids import folder_name, plain_id
+from training.settings.errors import UsageError
 
 SAME_TASK = (
     "reward_type", "fidelity", "observe_task_guide",
@@ -34,6 +35,22 @@ def task_name(env_id: str, arguments: dict[str, Any]) -> str:
         value = re.sub(r"[^A-Za-z0-9.]+", "-", json.dumps(arguments[name], default=str))
         words.append(f"{name}-{value.strip('-')}")
     return "-".join(words)
+
+
+def check_same_task(trained: str, env_id: str, what: str) -> None:
+    """Raises UsageError if two ids are of different tasks of this project.
+
+    Args:
+        trained: Environment id that a policy was trained on.
+        env_id: Another one, that it is to act on.
+        what: Names the policy.
+    """
+    tasks = []
+    for name in (trained, env_id):
+        spec = gym.registry.get(name)
+        tasks.append(spec.kwargs.get("task") if spec is not None else None)
+    if all(task in TASKS for task in tasks) and tasks[0] != tasks[1]:
+        raise UsageError(f"{what} was trained on {trained}, which is another task than {env_id}")
 
 
 def task_defaults(env_id: str) -> dict[str, Any]:

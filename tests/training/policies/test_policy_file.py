@@ -311,7 +311,7 @@ def test_module_named_in_a_file_is_not_imported(saved, tmp_path, monkeypatch):
     (tmp_path / "intruder.py").write_text("raise AssertionError('imported')")
     monkeypatch.syspath_prepend(str(tmp_path))
     other = {"id": "intruder:RigidEnvs/Posh-v0", "version": 0, "kwargs": {}}
-    with pytest.raises(UsageError, match="not installed; did you mean --env RigidEnvs/Push-v0"):
+    with pytest.raises(UsageError, match=r"not registered; .* mean --env RigidEnvs/Push-v0"):
         read_policy(rewritten(saved, tmp_path, environment=other))
 
 

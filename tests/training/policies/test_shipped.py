@@ -8,9 +8,11 @@ import pytest
 from rigid_envs import RigidEnv
 from rigid_envs.episodes.runner import Runner
 from training.commands import cli
+from training.policies.policy_file import read_policy
 from training.policies.trained_policy import shipped_policy
 from training.results.evaluate import evaluate
 from training.results.video import record
+from training.settings.data_folders import data_folder
 from training.settings.errors import UsageError
 
 
@@ -72,3 +74,11 @@ def test_a_policy_of_the_state_acts_beside_pixels():
         policy.check(RigidEnv("push", obs_type="pixels").observation_space)
     with pytest.raises(UsageError, match="requires observations"):
         policy.check(RigidEnv("push", obs_type="flat").observation_space)
+
+
+def test_a_policy_of_another_task_with_the_same_observations_is_refused():
+    """Push and Slide observe 22 numbers each; a dense id is the same task."""
+    path = data_folder("shipped", "results") / "ppo/RigidEnvs-Push-v0_seed0/policy.safetensors"
+    with pytest.raises(UsageError, match="trained on RigidEnvs/Push-v0, which is another task"):
+        read_policy(path, env_id="RigidEnvs/Slide-v0")
+    assert read_policy(path, env_id="RigidEnvs/PushDense-v0").env_id == "RigidEnvs/PushDense-v0"

@@ -246,7 +246,7 @@ def test_her_with_a_penalty_on_actions_raises(write_yaml, name):
 def test_unknown_algorithm_and_environment_suggest_the_nearest():
     with pytest.raises(UsageError, match=r"'pp0'; did you mean 'ppo'\?"):
         load_config("pp0", ENV)
-    with pytest.raises(UsageError, match=r"'Push-v0'; did you mean 'RigidEnvs/Push-v0'\?"):
+    with pytest.raises(UsageError, match=r"isn't registered; did you mean 'RigidEnvs/Push-v0'\?"):
         load_config("ppo", "Push-v0")
 
 
