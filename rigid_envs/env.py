@@ -1,6 +1,6 @@
 """The single environment: one world as a Gymnasium environment."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -149,8 +149,10 @@ class RigidEnv(gym.Env[Observation, Array]):
             states: from `get_state`, as those of an episode. The environment's own state stays.
 
         Raises:
-            ValueError: no states, or not such states.
+            TypeError, ValueError: no list, no states, or not such states.
         """
+        if isinstance(states, Mapping):
+            raise TypeError("states must be a list of states, got a single one")
         if not states:
             raise ValueError("states must be at least one, got none")
         now = self.get_state()

@@ -153,8 +153,12 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
 
     @property
     def camera(self) -> Camera:
-        """Where frames and observed pictures are taken from."""
+        """Where frames are taken from; it can be set as that of `RigidEnv`."""
         return self._pictures.camera
+
+    @camera.setter
+    def camera(self, camera: Any) -> None:
+        self._pictures.look(camera)
 
     @property
     def runner(self) -> Runner:

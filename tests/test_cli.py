@@ -53,6 +53,8 @@ def test_every_command_has_help(command, capsys):
         ([], "COMMAND"),
         (["trian"], "invalid choice: 'trian'"),
         (["train", "--algo", "pp0"], "did you mean 'ppo'?"),
+        (["evaluate", "trained", "--stochastic"], "needs a run folder or a model.zip"),
+        (["record", "scripted", "--stochastic"], "needs a run folder or a model.zip"),
         (["train", "--algo", "td3"], "unknown algorithm 'td3'; there are ppo and sac"),
         (
             ["train", "--algo", "sac", "--env", "RigidEnvs/Reach-v0"],

@@ -138,6 +138,11 @@ def policy_of(options: argparse.Namespace) -> "Policy":
     from training.policies.policy import SCRIPTED, scripted_policy
     from training.policies.trained_policy import SHIPPED, shipped_policy, trained_policy
 
+    if options.policy in (SCRIPTED, SHIPPED) and getattr(options, "stochastic", False):
+        raise UsageError(
+            f"--stochastic samples actions, which needs a run folder or a model.zip; "
+            f'"{options.policy}" has only one action for each observation'
+        )
     if options.policy == SCRIPTED:
         return scripted_policy(
             options.env or DEFAULT_ENV, **env_kwargs_of(options, scripted_policy)

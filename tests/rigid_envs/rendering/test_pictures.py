@@ -325,6 +325,13 @@ def test_a_camera_for_an_episode_just_sees_all_that_moves(env_id):
     np.testing.assert_array_equal(env.render(), before)
     with pytest.raises(ValueError, match="states must be at least one"):
         env.camera_for([])
+    with pytest.raises(TypeError, match="a list of states, got a single one"):
+        env.camera_for(states[0])
+    many = make_vec(2, env_id, render_mode="rgb_array", fidelity="fast")
+    many.reset(seed=1)
+    before = many.render()[1]
+    many.camera = "top"
+    assert (many.render()[1] != before).any()
 
 
 def test_a_cross_shows_where_the_ball_landed_and_stays_there():

@@ -83,10 +83,10 @@ def test_mistakes_are_reported_in_one_line(words, complaint, capfd, viewed):
     assert not viewed
 
 
-def test_a_policy_for_other_observations_is_rejected_before_the_page_opens(capfd, viewed):
+def test_a_policy_of_another_task_is_rejected_before_the_page_opens(capfd, viewed):
     (file,) = PUSH_POLICY.glob("*.safetensors")
     assert view("--policy", str(file), "--env", "RigidEnvs/Throw-v0") == 2
-    assert "observations of shapes" in capfd.readouterr().err
+    assert "another task than RigidEnvs/Throw-v0" in capfd.readouterr().err
     assert not viewed
 
 
