@@ -7,6 +7,7 @@ import pytest
 
 from physics import PRESETS, Body, Ground, Material, Mesh, Scene, World
 from physics.analysis.sinks import depth_on_plane
+from physics.analysis.soft_supports import DEEP
 from physics.model.pairs import Layout
 from physics.reference import meshes
 from physics.rotation import rotate_back, rotation_matrix
@@ -166,11 +167,16 @@ def test_a_round_mesh_sinks_as_far_as_its_samples_say(name, preset, stress):
 
 
 def test_a_world_warns_of_a_mesh_that_lies_too_softly():
+    """A knight that falls comes to lie on one of its sides, which sink by different depths."""
     knight = mesh_of(meshes.knight())
-    fallen = dropped(knight, "fast", 2e-3, 1)
-    fallen.advance(3.0)
+    fallen = dropped(knight, "fast", 2e-3, 12)
+    fallen.advance(4.0)
     stands = knight.placed((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))[1]
-    for turn, deep in ((stands, False), (tuple(fallen.orientation[0, 0]), True)):
+    cases = [(stands, False)]
+    deep = fallen.penetration() > DEEP * knight.width
+    assert 0 < deep.sum() < 12
+    cases += zip(map(tuple, fallen.orientation[:, 0]), deep.tolist(), strict=True)
+    for turn, deep in cases:
         body = Body(knight, density=DENSITY, orientation=turn)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
