@@ -108,14 +108,19 @@ def test_the_speed_that_passes_through_is_half_a_width_per_substep():
 
 
 def test_costs_add_up_to_the_whole():
-    text = section(Fidelity().explain(CUBE), "Cost")
-    costs = {line.split("  ")[1].strip(): float(re.search(r"([\d,]+) ns", line)[1].replace(",", ""))
-             for line in text.splitlines()}  # fmt: skip
-    assert list(costs) == ["motion of bodies", "contacts", "friction", "all"]
-    assert costs["all"] == pytest.approx(sum(list(costs.values())[:-1]), abs=3)
-    assert costs["contacts"] > 0.0
-    substep = 1e9 * simulate(Course(CUBE, 5, 0.02, 16), Fidelity()).cost * Fidelity().substep
-    assert costs["all"] == pytest.approx(substep, rel=0.5)
+    course, wholes, substeps = Course(CUBE, 5, 0.02, 16), [], []
+    for _ in range(3):
+        text = section(Fidelity().explain(CUBE), "Cost")
+        costs = {line.split("  ")[1].strip():
+                 float(re.search(r"([\d,]+) ns", line)[1].replace(",", ""))
+                 for line in text.splitlines()}  # fmt: skip
+        assert list(costs) == ["motion of bodies", "contacts", "friction", "all"]
+        assert costs["all"] == pytest.approx(sum(list(costs.values())[:-1]), abs=3)
+        assert costs["contacts"] > 0.0
+        wholes.append(costs["all"])
+        substeps.append(1e9 * simulate(course, Fidelity()).cost * Fidelity().substep)
+    # other processes only make a reading longer
+    assert min(wholes) == pytest.approx(min(substeps), rel=0.5)
 
 
 def test_many_bodies_are_listed_by_kind():
