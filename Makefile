@@ -11,8 +11,10 @@ OLD_BIN := .venv/oldest/bin
 OLD_STAMP := .venv/oldest/.installed
 RAY_BIN := .venv/ray/bin
 RAY_STAMP := .venv/ray/.installed
+TWINS_BIN := .venv/twins/bin
+TWINS_STAMP := .venv/twins/.installed
 
-.PHONY: help demo test package wheel oldest ray stress bench check docs clean
+.PHONY: help demo test package wheel oldest ray twins stress bench check docs clean
 
 help:
 	@echo "make demo    train the pushing policy, evaluate it, film it"
@@ -21,6 +23,7 @@ help:
 	@echo "make wheel   build a wheel with compiled kernels for this kind of machine into dist/"
 	@echo "make oldest  test the oldest versions that are supported, in .venv/oldest"
 	@echo "make ray     run the tests that need Ray, in .venv/ray"
+	@echo "make twins   test twins beside their originals, in .venv/twins"
 	@echo "make stress  run the tests in their long form, with many more random examples; PART=2/8 runs a part"
 	@echo "make bench   measure speed and accuracy, together with MuJoCo"
 	@echo "make check   lint, format, types, import rules, documentation"
@@ -88,6 +91,15 @@ $(OLD_STAMP): pyproject.toml constraints-oldest.txt Makefile
 
 oldest: $(OLD_STAMP)
 	$(OLD_BIN)/python -m pytest -q -n 2 --dist loadfile tests/physics/compiler tests/physics/step/test_kernel_choice.py
+
+# Gymnasium-Robotics and panda-gym, which need an older MuJoCo, in a virtual environment of their own.
+$(TWINS_STAMP): constraints-twins.txt
+	$(PYTHON) -m venv .venv/twins
+	$(TWINS_BIN)/python -m pip install --quiet -r constraints-twins.txt
+	@touch $@
+
+twins: $(TWINS_STAMP) $(TESTS)
+	TWINS_PYTHON=$(TWINS_BIN)/python $(BIN)/python -m pytest -q tests/originals
 
 stress: $(TESTS)
 	$(BIN)/python -m pytest -q --hypothesis-profile=stress $(if $(PART),--part $(PART))

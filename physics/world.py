@@ -27,7 +27,7 @@ from physics.readings import Readings
 from physics.scene.fidelity import Fidelity, resolve
 from physics.scene.parameters import Parameters, check_ranges, check_values
 from physics.scene.scene import Scene
-from physics.scene.validation import ZERO, array, instance, integer, positive
+from physics.scene.validation import ZERO, array, instance, integer, number, positive
 from physics.snapshot import Snapshot
 from physics.step.kernel_choice import requested
 from physics.step.simulation import Simulation
@@ -226,17 +226,18 @@ class World(Readings):
 
         Args:
             target: [count, drives, 3] m, or what broadcasts to it.
-            time: s, duration of the motion.
+            time: s, duration of the motion. With 0 the set points are there at once, and the servos
+                answer a step.
 
         Raises:
-            TypeError, ValueError: a wrong shape, a value that isn't finite, a time that isn't above
-                zero, or a scene without drives.
+            TypeError, ValueError: a wrong shape, a value that isn't finite, a negative time, or a
+                scene without drives.
         """
         checked = array("target", target, self._drives_shape("move_drives"))
-        time = positive("time", time)
+        time = number("time", time, low=0.0)
         simulation = self._simulation
         make_move_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked), time)
-        simulation.changed(poses=False)
+        simulation.changed(poses=time == 0.0)
 
     def _drives_shape(self, method: str) -> tuple[int, int, int]:
         """Shape of a vector for every drive in every world; an error if there are no drives."""

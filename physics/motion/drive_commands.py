@@ -41,7 +41,7 @@ def make_velocity_command() -> Any:
 
 @cache
 def make_move_command() -> Any:
-    """Entry point: every set point moves from where it is to a target in `time` s and stops."""
+    """Entry point: every set point moves to a target in `time` s and stops; at once if 0."""
 
     @entry
     def move(dynamic, bodies, target, time):
@@ -50,7 +50,11 @@ def make_move_command() -> Any:
                 drive = dynamic[w, bodies + d]
                 drive.reference_time = time
                 for c in range(3):
-                    distance = target[d, c, w] - drive.reference[c]
-                    drive.reference_velocity[c] = distance / time
+                    if time > 0.0:
+                        distance = target[d, c, w] - drive.reference[c]
+                        drive.reference_velocity[c] = distance / time
+                    else:
+                        drive.reference[c] = target[d, c, w]
+                        drive.reference_velocity[c] = 0.0
 
     return move

@@ -6,7 +6,8 @@ from difflib import get_close_matches
 from typing import Any
 
 from physics.scene.validation import choice
-from rigid_envs.tasks import TASKS, Task
+from rigid_envs.catalog import NAMED_TASKS
+from rigid_envs.tasks import Task
 
 # arguments of one kind of environment, or of the Gymnasium function that makes it, that the other
 # kind does not have
@@ -49,7 +50,7 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
     others = list(others)
     if not isinstance(task, Task):
         if not (isinstance(task, type) and issubclass(task, Task)):
-            task = TASKS[choice("task", task, TASKS)]
+            task = NAMED_TASKS[choice("task", task, NAMED_TASKS)]
         known = list(inspect.signature(task).parameters)
     name = (task if isinstance(task, type) else type(task)).__name__
     for argument in arguments:
@@ -59,7 +60,7 @@ def make_task(task: Any, arguments: dict[str, Any], others: Iterable[str]) -> Ta
             raise TypeError(f"argument {argument!r} {_WHERE[argument]}")
         near = get_close_matches(argument, [*known, *others], 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        owners = [one.__name__ for one in TASKS.values() if argument in argument_names(one)]
+        owners = [one.__name__ for one in NAMED_TASKS.values() if argument in argument_names(one)]
         if owners and name not in owners:
             hint = f"it belongs to {' and '.join(owners)}; "
         accepted = f"{name} accepts {known or 'no arguments of its own'}"

@@ -21,11 +21,11 @@ class Observed(NamedTuple):
     """What users and the runner take from a table of observations.
 
     Attributes:
-        observation: [count, n] float32.
-        achieved: [count, goal] float32.
-        desired: [count, goal] float32.
+        observation: [count, n], of the table's type, as all goals.
+        achieved: [count, goal].
+        desired: [count, goal].
         outside: [count] bool, whether any component of a world was clipped.
-        goals: [count, 2 goal] float32, achieved and desired side by side, as `rewards.join_goals`
+        goals: [count, 2 goal], achieved and desired side by side, as `rewards.join_goals`
             gives them; [0, 2 goal] if nobody asks.
         goal_distance: [count], as `goals.distance` gives it, in every bit.
     """
@@ -39,7 +39,8 @@ class Observed(NamedTuple):
 
 
 @cache
-def _make_split(measure: Measure) -> Any:
+def _make_split(measure: Measure, dtype: np.dtype[Any]) -> Any:
+    """Entry of `split` for tables of a type: an entry takes arguments of one layout."""
 
     @entry
     def split(table, low, high, goals, rows):
@@ -92,23 +93,24 @@ def split(
     NaN stays NaN.
 
     Args:
-        table: [n + goal, count or more] float32, C-contiguous; the achieved goals are last.
-        low: [n + goal] float32.
-        high: [n + goal] float32.
-        goals: [count, goal] float32, Fortran-contiguous: the desired ones.
+        table: [n + goal, count or more], C-contiguous; the achieved goals are last. It and what
+            follows is float32 or float64.
+        low: [n + goal].
+        high: [n + goal].
+        goals: [count, goal], Fortran-contiguous: the desired ones.
         joins: whether to write `Observed.goals`.
         measure: of the goal distance.
     """
     count, goal = goals.shape
     rows = Observed(
-        np.empty((count, len(low) - goal), dtype=np.float32),
-        np.empty((count, goal), dtype=np.float32),
-        np.empty((count, goal), dtype=np.float32),
+        np.empty((count, len(low) - goal), dtype=table.dtype),
+        np.empty((count, goal), dtype=table.dtype),
+        np.empty((count, goal), dtype=table.dtype),
         np.empty(count, dtype=bool),
-        np.empty((count if joins else 0, 2 * goal), dtype=np.float32),
+        np.empty((count if joins else 0, 2 * goal), dtype=table.dtype),
         np.empty(count),
     )
-    _make_split(measure)(table, low, high, goals.T, rows)
+    _make_split(measure, table.dtype)(table, low, high, goals.T, rows)
     return rows
 
 

@@ -61,13 +61,16 @@ class Observations:
         guide_bounds = self._task.guide_bounds if self._guide else ()
         # options append components, so that the indices of the others do not change
         self.bounds: Bounds = (*self._task.bounds, *parameter_bounds, *guide_bounds)
-        low, high = _limits(self.bounds)
-        goal_low, goal_high = _limits(self._task.goal_bounds)
+        dtype = self._task.dtype
+        low, high = _limits(self.bounds, dtype)
+        goal_low, goal_high = _limits(self._task.goal_bounds, dtype)
         self._low, self._high = np.append(low, goal_low), np.append(high, goal_high)
+        if not self._task.bounds_end_episodes:
+            self._low[:], self._high[:] = -np.inf, np.inf
         observed: dict[str, spaces.Space[Any]] = {
-            "observation": spaces.Box(low, high, dtype=np.float32),
-            "achieved_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
-            "desired_goal": spaces.Box(goal_low, goal_high, dtype=np.float32),
+            "observation": spaces.Box(low, high, dtype=dtype),
+            "achieved_goal": spaces.Box(goal_low, goal_high, dtype=dtype),
+            "desired_goal": spaces.Box(goal_low, goal_high, dtype=dtype),
         }
         self._keeps_state = pixels is not None and pixels.keeps_state
         self.pixels: Pixels | None = None
@@ -82,7 +85,7 @@ class Observations:
             # in this order of names; `gymnasium.spaces.flatten` sorts them
             ends = [(low, high), (goal_low, goal_high), (goal_low, goal_high)]
             lows, highs = (np.concatenate(part) for part in zip(*ends, strict=True))
-            self.space = spaces.Box(lows, highs, dtype=np.float32)
+            self.space = spaces.Box(lows, highs, dtype=dtype)
         self._checked = False
 
     def observe(
@@ -103,7 +106,7 @@ class Observations:
         task, world, count = self._task, self._runner.world, self._runner.count
         goal_start, task_end = len(self.bounds), len(task.bounds)
         guide_start = goal_start - (len(task.guide_bounds) if self._guide else 0)
-        table = columns((len(self._low),), count, np.float32)
+        table = columns((len(self._low),), count, task.dtype)
         values = table.T[:count]
         if not self._checked:
             table[...] = np.nan
@@ -137,7 +140,7 @@ class Observations:
         return observation, rows, achieved
 
 
-def _limits(bounds: Bounds) -> tuple[Array, Array]:
+def _limits(bounds: Bounds, dtype: Any) -> tuple[Array, Array]:
     """Low and high [n] of bounds."""
-    low = np.array([b[2] for b in bounds], dtype=np.float32)
-    return low, np.array([b[3] for b in bounds], dtype=np.float32)
+    low = np.array([b[2] for b in bounds], dtype=dtype)
+    return low, np.array([b[3] for b in bounds], dtype=dtype)

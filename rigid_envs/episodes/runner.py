@@ -11,6 +11,7 @@ from physics import Fidelity, Parameters, Scene, SimulationDiverged, Snapshot, W
 from physics.scene.fidelity import resolve
 from physics.scene.validation import choice
 from physics.step.kernel_choice import general_is_compiled, requested
+from rigid_envs.catalog import NAMED_TASKS
 from rigid_envs.episodes.arguments import argument_names, make_task
 from rigid_envs.episodes.checks import KEEP_SEED, step_limit
 from rigid_envs.episodes.columns import clip_actions
@@ -19,7 +20,7 @@ from rigid_envs.episodes.observations import Observation, Observations
 from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms
-from rigid_envs.tasks import TASKS, Task
+from rigid_envs.tasks import Task
 from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, describe_info
 
 Array = np.ndarray
@@ -123,7 +124,9 @@ class Runner:
         self._elapsed = np.zeros(count, dtype=np.int64)
         self._now = self.world.read()
         self._goal_distance = np.zeros(count)
-        self._goals = np.zeros((count, len(self.task.goal_bounds)), dtype=np.float32, order="F")
+        self._goals = np.zeros(
+            (count, len(self.task.goal_bounds)), dtype=self.task.dtype, order="F"
+        )
 
     def _worlds(
         self,
@@ -134,7 +137,7 @@ class Runner:
         per_world_parameters: bool,
     ) -> World:
         """The worlds of the episodes."""
-        kernel, registered = self._kernel, type(self.task) in TASKS.values()
+        kernel, registered = self._kernel, type(self.task) in NAMED_TASKS.values()
         if kernel == "auto" and registered and not general_is_compiled(
             scene, resolve(fidelity), per_world_parameters
         ):  # fmt: skip

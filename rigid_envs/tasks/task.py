@@ -42,11 +42,16 @@ class Task(ABC):
         video_camera: the name of the camera of recorded videos: "follow" where a body is small
             compared with its path. If None, it looks from the side of `camera`, so near that it
             just sees the whole episode, see `RigidEnv.camera_for`.
+        dtype: of observations and goals: np.float32 or np.float64.
+        bounds_end_episodes: whether an observation beyond its bounds is clipped and truncates the
+            episode.
         size_range: smallest and largest factor of body sizes that `start` supports when each world
             has its own sizes; None if the task supports only the sizes of its scene.
     """
 
     frame: ClassVar[float] = 1.0 / 25.0
+    dtype: ClassVar[type[np.floating]] = np.float32
+    bounds_end_episodes: ClassVar[bool] = True
     max_episode_steps: int = 50
     actions: tuple[str, ...]
     bounds: Bounds

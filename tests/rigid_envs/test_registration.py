@@ -9,7 +9,7 @@ import pytest
 
 import rigid_envs
 from rigid_envs import RigidEnv, RigidVectorEnv, Runner
-from rigid_envs.registration import NAMES, register
+from rigid_envs.registration import NAMES, TWIN_NAMES, register
 from rigid_envs.tasks import TASKS, Push
 from tests.rigid_envs.rollout import DENSE_IDS, IDS, PUSH, STACK, assert_same, make, make_vec
 
@@ -54,7 +54,8 @@ def custom_ids():
 
 def test_ids_are_registered_and_registering_again_changes_nothing():
     specs = {env_id: gym.registry[env_id] for env_id in gym.registry if env_id[:5] == "Rigid"}
-    assert set(specs) == {*IDS, *DENSE_IDS}
+    twins = {f"RigidEnvs/{name}{kind}-v0" for name in TWIN_NAMES for kind in ("", "Dense")}
+    assert set(specs) == {*IDS, *DENSE_IDS, *twins}
     register()
     gym.register_envs(rigid_envs)
     assert all(gym.registry[env_id] is spec for env_id, spec in specs.items())

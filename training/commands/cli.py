@@ -69,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     evaluation = command("evaluate", handlers.evaluate, "Measure the success rate of a policy.")
     shared_flags.add_policy(evaluation)
     shared_flags.add_episodes(evaluation, 1000)
+    flags.add_original(evaluation)
 
     recording = command(
         "record", handlers.record, "Record a video of a policy (mp4 or GIF) and a still image."

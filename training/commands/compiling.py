@@ -19,7 +19,7 @@ from physics.compiler.files.code_cache import NOTE, folders, versions
 from physics.compiler.files.levels import LEVELS, offered
 from physics.reference.general import GENERAL_KERNELS, compile_general
 from physics.scene.fidelity import PRESETS
-from rigid_envs.registration import ENVIRONMENTS
+from rigid_envs.registration import ENVIRONMENTS, NAMES
 from training.settings.errors import UsageError
 
 
@@ -27,7 +27,8 @@ def run(ids: Sequence[str], presets: Sequence[str], general_only: bool = False) 
     """Compiles the general kernels, then the special ones of environments at presets.
 
     Args:
-        ids: of environments; the sparse ids of all tasks if empty. Dense ids have the same kernels.
+        ids: of environments; the sparse ids of all tasks but twins if empty. Dense ids have the
+            same kernels.
         presets: names of fidelities; all if empty.
         general_only: leave the special kernels out.
 
@@ -39,7 +40,7 @@ def run(ids: Sequence[str], presets: Sequence[str], general_only: bool = False) 
     ):  # fmt: skip
         if unknown := [name for name in given if name not in known]:
             raise UsageError(f"unknown {kind} {unknown[0]!r}: choose from {', '.join(known)}")
-    chosen = ids or [name for name in ENVIRONMENTS if "Dense" not in name]
+    chosen = ids or [f"RigidEnvs/{name}-v0" for name in NAMES]
     jobs: dict[str, Callable[[], None]] = {
         f"general kernel, {name}": partial(compile_general, name) for name in GENERAL_KERNELS
     }

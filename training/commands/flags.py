@@ -67,7 +67,9 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 
 def add_compiling(parser: argparse.ArgumentParser) -> None:
     """Flags of compiling ahead of time."""
-    parser.add_argument("ids", nargs="*", metavar="ID", help="environments (default: all tasks)")
+    parser.add_argument(
+        "ids", nargs="*", metavar="ID", help="environments (default: all tasks but twins)"
+    )
     parser.add_argument(
         "--fidelity", nargs="+", default=[], metavar="PRESET",
         help="fast, balanced, accurate or solid (default: all)",
@@ -164,6 +166,22 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="PNG to write (default: learning_curve.png in the run folder; for several runs, a "
         "file next to their folders)",
+    )
+
+
+def add_original(parser: argparse.ArgumentParser) -> None:
+    """Flags of an evaluation in another suite's environment."""
+    parser.add_argument(
+        "--in",
+        dest="original",
+        metavar="ID",
+        help="play the episodes in the original of a twin instead, as FetchPush-v4 or PandaPush-v3",
+    )
+    parser.add_argument(
+        "--python",
+        type=Path,
+        metavar="INTERPRETER",
+        help="interpreter that has the original (default: that of `make twins`, or this one)",
     )
 
 

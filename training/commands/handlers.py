@@ -69,6 +69,16 @@ def evaluate(options: argparse.Namespace) -> int:
     kwargs = env_kwargs_of(options, evaluation.evaluate)
     policy = policy_of(options)
     seed = EVALUATION if options.seed is None else options.seed
+    if getattr(options, "original", None) is not None:
+        from training.results.originals import evaluate_original
+
+        if kwargs:
+            raise UsageError(f"--in has its own environment, which does not take {list(kwargs)}")
+        policy, result = evaluate_original(
+            policy, options.original, options.n_episodes, seed=seed, python=options.python
+        )
+        evaluation.print_evaluation(policy, result)
+        return 0
     result = evaluation.evaluate(policy, options.n_episodes, seed=seed, **kwargs)
     evaluation.print_evaluation(policy, result)
     return 0

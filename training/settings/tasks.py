@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium as gym
 
 import rigid_envs  # noqa: F401  (registers the ids)
-from rigid_envs.tasks import TASKS
+from rigid_envs.catalog import NAMED_TASKS
 from training.settings.environment_ids import folder_name, plain_id
 from training.settings.errors import UsageError
 
@@ -49,14 +49,14 @@ def check_same_task(trained: str, env_id: str, what: str) -> None:
     for name in (trained, env_id):
         spec = gym.registry.get(name)
         tasks.append(spec.kwargs.get("task") if spec is not None else None)
-    if all(task in TASKS for task in tasks) and tasks[0] != tasks[1]:
+    if all(task in NAMED_TASKS for task in tasks) and tasks[0] != tasks[1]:
         raise UsageError(f"{what} was trained on {trained}, which is another task than {env_id}")
 
 
 def task_defaults(env_id: str) -> dict[str, Any]:
     """Arguments of a task of this project and their defaults; empty for other environments."""
     spec = gym.registry.get(env_id)
-    task = TASKS.get(str(spec.kwargs.get("task"))) if spec is not None else None
+    task = NAMED_TASKS.get(str(spec.kwargs.get("task"))) if spec is not None else None
     parameters = inspect.signature(task).parameters.values() if task is not None else ()
     return {one.name: one.default for one in parameters}
 

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-import gymnasium as gym
 import pytest
 
 from rigid_envs import RigidEnv
 from rigid_envs.episodes.runner import Runner
+from rigid_envs.registration import NAMES
 from training.commands import cli
 from training.policies.policy_file import read_policy
 from training.policies.trained_policy import shipped_policy
@@ -15,8 +15,12 @@ from training.results.video import record
 from training.settings.data_folders import data_folder
 from training.settings.errors import UsageError
 
+KINDS = ("", "Dense")
 
-@pytest.mark.parametrize("env_id", [name for name in gym.registry if name.startswith("RigidEnvs/")])
+
+@pytest.mark.parametrize(
+    "env_id", [f"RigidEnvs/{name}{kind}-v0" for name in NAMES for kind in KINDS]
+)
 def test_each_task_has_one(env_id):
     policy = shipped_policy(env_id)
     assert policy.env_id == env_id

@@ -1,0 +1,97 @@
+"""Recorded actions played in twins, and how far the paths differ."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.twins.recordings import Recording
+from physics import World
+from rigid_envs.twins import TWINS
+from rigid_envs.twins.twin import Twin
+
+Array = np.ndarray
+
+# first component of the object's position in observations, by the first word of names
+OBJECT = {"fetch": 3, "panda": 6}
+
+
+class Replay(NamedTuple):
+    """What a twin does with recorded actions.
+
+    Attributes:
+        hand: [steps + 1, episodes, 3] m.
+        body: [steps + 1, episodes, 3] m, of the object; no episodes if there is none.
+    """
+
+    hand: Array
+    body: Array
+
+
+def replay(recording: Recording, twin: Twin, fidelity: str = "balanced") -> Replay:
+    """Plays recorded actions from the recorded starts, in all episodes at once."""
+    count = recording.actions.shape[1]
+    world = World(twin.scene(), fidelity, count)
+    first = OBJECT[type(twin).__name__[:5].lower()]
+    bodies = len(world.scene.bodies)
+    if bodies:
+        world.set_state(position=recording.observations[0, :, None, first : first + 3])
+    hands, body = [], []
+    hand = twin.hand  # type: ignore[attr-defined]
+    now = world.read()
+    for step in range(len(recording.actions) + 1):
+        hands.append(np.array(hand.position(now)))
+        if bodies:
+            body.append(np.array(now.position[:, 0]))
+        if step < len(recording.actions):
+            twin.act(world, now, recording.actions[step])
+            world.advance(twin.frame)
+            now = world.read()
+    return Replay(np.array(hands), np.array(body))
+
+
+def hand_errors(recording: Recording, found: Replay, steps: int = 12) -> Array:
+    """Distance [episodes] m of the hands after some steps."""
+    offset = found.hand[steps] - recording.observations[steps, :, :3]
+    return np.asarray(np.linalg.norm(offset, axis=1))
+
+
+def body_errors(recording: Recording, found: Replay, first: int) -> Array:
+    """Distance [episodes] m of the objects after the last step."""
+    offset = found.body[-1] - recording.observations[-1, :, first : first + 3]
+    return np.asarray(np.linalg.norm(offset, axis=1))
+
+
+# recordings by name: the twin that plays them
+REPLAYED = {
+    "fetch-axes": "fetch_reach",
+    "fetch-motions": "fetch_reach",
+    "fetch-pushes": "fetch_push",
+    "fetch-slides": "fetch_slide",
+    "panda-axes": "panda_reach",
+    "panda-motions": "panda_reach",
+    "panda-pushes": "panda_push",
+}
+
+
+def summary() -> list[str]:
+    """A line for each recording: the errors of the hand after 12 steps, and of the object."""
+    lines = []
+    for name, twin in REPLAYED.items():
+        recording = Recording.load(name)
+        found = replay(recording, TWINS[twin]())
+        parts = [f"{name:15}"]
+        if len(found.body):
+            errors = 1e3 * body_errors(recording, found, OBJECT[name[:5]])
+            moved = np.linalg.norm(np.diff(found.body[[0, -1]], axis=0)[0], axis=1) > 0.01
+            parts.append(
+                f"object after the last step: median {np.median(errors):6.1f} mm, 90 % within "
+                f"{np.quantile(errors, 0.9):6.1f} mm; {moved.sum()} of {len(moved)} moved"
+            )
+        else:
+            errors = 1e3 * hand_errors(recording, found)
+            parts.append(
+                f"hand after 12 steps: median {np.median(errors):6.2f} mm, at most "
+                f"{errors.max():6.2f} mm"
+            )
+        lines.append(" ".join(parts))
+    return lines

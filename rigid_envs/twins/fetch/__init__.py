@@ -1,0 +1,1 @@
+"""Twins of the Fetch environments of Gymnasium-Robotics (MuJoCo)."""

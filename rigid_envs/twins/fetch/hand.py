@@ -1,0 +1,153 @@
+"""The hand of the Fetch robot.
+
+In the originals a weld pulls the hand towards a mocap body. Each step puts that body 5 cm times the
+action ahead of where the hand is, so the hand answers a step; under load it hangs back, and nothing
+makes up for it. The weld holds the hand as a spring and damper would: a servo whose frequency,
+damping and stride `python -m benchmarks.twins identify` finds from recorded motions.
+
+The arm's weight and joint damping add a small pull, the sag. Frames: x forward, y left, z up.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from physics import Box, Drive, Gripper, Material, Readout, World
+from rigid_envs.twins.servo import Servo, move_set_points
+
+Array = np.ndarray
+Vector = tuple[float, float, float]
+
+# identified
+ARM = Servo(55.8, 1.09)
+STRIDE = 0.0499  # m, of the set point at full action
+SAG = np.array([-0.35e-3, 0.02e-3, -0.14e-3])  # m, of the set point
+
+# from the originals' model. Boxes of fingers are 1 mm larger: their contacts begin at that distance
+MARGIN = 1e-3  # m
+ABOVE_GRIP = 0.02  # m, of the fingers' middle over the grip site, whose position is observed
+HALF_LENGTH, HALF_DEPTH, HALF_WIDTH = 0.0385, 0.0135, 0.007  # m, of a finger along z, x and y
+CLOSED = 0.0079  # m along y, of a closed finger's middle from the hand's
+WIDEST = 0.05  # m, how far a finger opens
+FRICTION = 1.0
+# a finger is a mass of 104 kg, with its motor's inertia, on a spring of 30 kN/m with a damper
+FINGER = Servo((30e3 / 104.0) ** 0.5, 1e3 / (2.0 * (30e3 * 104.0) ** 0.5))
+FARTHEST = 0.2  # m, of a finger's set point
+
+# groups: the object, the hand, and the table that only the hand touches
+OBJECT, HAND, UNDER_HAND = 1, 2, 4
+# contacts of the hand begin 1 mm below its fingers, not above them: half of it belongs to a length
+_OFFSET = np.array([0.0, 0.0, ABOVE_GRIP - 0.5 * MARGIN])
+_HALF_Z = HALF_LENGTH + 0.5 * MARGIN
+
+ACTIONS = ("hand x", "hand y", "hand z", "grip")
+
+
+@dataclass(frozen=True)
+class ClosedHand:
+    """The closed fingers, one box.
+
+    Args:
+        start: position of the grip site at the start of an episode, m.
+    """
+
+    start: Vector
+
+    # kg. The original's hand weighs some 400 kg to what it meets; 40 kg are as steady to an object
+    # of 2 kg, and squash it less where it is in the way
+    MASS: ClassVar[float] = 40.0
+
+    def drive(self) -> Drive:
+        """The drive of a scene."""
+        return Drive(
+            Box((HALF_DEPTH + MARGIN, CLOSED + HALF_WIDTH + MARGIN, _HALF_Z)),
+            mass=self.MASS, force_limit=1e6, position=tuple(self.start + _OFFSET),
+            frequency=ARM.frequency, damping_ratio=ARM.damping,
+            material=Material(FRICTION, restitution=0.0), name="hand",
+            group=HAND, mask=OBJECT | UNDER_HAND,
+        )  # fmt: skip
+
+    def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
+        """Moves the hand by actions [count, 4]; the last component has no effect."""
+        ahead, speed = _follow(world, self.velocity(now), actions, frame)
+        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
+
+    def position(self, now: Readout) -> Array:
+        """Position [count, 3] m of the grip site."""
+        return now.position[:, -1] - _OFFSET
+
+    def velocity(self, now: Readout) -> Array:
+        """Velocity [count, 3] m/s."""
+        return now.linear_velocity[:, -1]
+
+    def fingers(self, now: Readout) -> tuple[float, float]:
+        """How far each finger is open, m, and its velocity, m/s: they are held closed."""
+        return 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class OpenHand:
+    """Two fingers that open and close; both always do the same.
+
+    Args:
+        start: position of the grip site at the start of an episode, m.
+    """
+
+    start: Vector
+
+    # kg. Light enough that the grip's force closes the fingers as fast as the original's
+    MASS: ClassVar[float] = 10.0
+    # N of each finger. The original presses with up to 720 N, which would squash the object: its
+    # contacts are about five times as stiff
+    GRIP: ClassVar[float] = 150.0
+
+    def drive(self) -> Gripper:
+        """The gripper of a scene."""
+        return Gripper(
+            Box((HALF_DEPTH + MARGIN, HALF_WIDTH + MARGIN, _HALF_Z)),
+            mass=0.5 * self.MASS, force_limit=1e6, grip_limit=self.GRIP,
+            position=tuple(self.start + _OFFSET), distance=2.0 * CLOSED,
+            frequency=ARM.frequency, damping_ratio=ARM.damping,
+            material=Material(FRICTION, restitution=0.0), name="hand",
+            group=HAND, mask=OBJECT | UNDER_HAND,
+        )  # fmt: skip
+
+    def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
+        """Moves the hand and its fingers by actions [count, 4]; a grip of -1 closes."""
+        opening, velocity = self.fingers(now)
+        target = np.clip(opening + actions[:, 3], 0.0, FARTHEST)
+        moved, _ = FINGER.answer(frame, target - opening, velocity)
+        moved = np.clip(opening + moved, 0.0, WIDEST) - opening
+        opening = opening + ARM.ahead(frame, world.fidelity.substep, moved, velocity)
+        ahead, speed = _follow(world, self.velocity(now), actions, frame)
+        move_set_points(world, self.pads(self.position(now) + ahead, opening), speed, frame)
+
+    def pads(self, position: Array, opening: Array) -> Array:
+        """Positions [n, 2, 3] m of the fingers of hands at [n, 3] m, each [n] m open."""
+        pads = np.stack([position + _OFFSET] * 2, axis=1)
+        pads[:, 0, 1] -= CLOSED + opening
+        pads[:, 1, 1] += CLOSED + opening
+        return pads
+
+    def position(self, now: Readout) -> Array:
+        """Position [count, 3] m of the grip site."""
+        return 0.5 * (now.position[:, -2] + now.position[:, -1]) - _OFFSET
+
+    def velocity(self, now: Readout) -> Array:
+        """Velocity [count, 3] m/s."""
+        return 0.5 * (now.linear_velocity[:, -2] + now.linear_velocity[:, -1])
+
+    def fingers(self, now: Readout) -> tuple[Array, Array]:
+        """How far each finger is open [count], m, and its velocity [count], m/s."""
+        position, velocity = now.position[:, -2:, 1], now.linear_velocity[:, -2:, 1]
+        return (
+            0.5 * (position[:, 1] - position[:, 0]) - CLOSED,
+            0.5 * (velocity[:, 1] - velocity[:, 0]),
+        )
+
+
+def _follow(world: World, velocity: Array, actions: Array, frame: float) -> tuple[Array, Array]:
+    """Set point [n, 3] m, ahead of hands of a velocity [n, 3] m/s, and its velocity [n, 3] m/s."""
+    moved, end = ARM.answer(frame, STRIDE * actions[:, :3] + SAG, velocity)
+    return ARM.moving(frame, world.fidelity.substep, moved, velocity, end)

@@ -1,0 +1,50 @@
+"""FetchPickAndPlace: the hand carries a cube to a goal on the table or above it."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from physics import Body, Readout, World
+from rigid_envs.tasks.rewards import distance
+from rigid_envs.twins.fetch.hand import OpenHand
+from rigid_envs.twins.fetch.push import HALF, cube
+from rigid_envs.twins.fetch.task import FetchObject
+from rigid_envs.twins.near_grasps import NEAR_GRASP_DRAWS, start_near_grasps
+from rigid_envs.twins.twin import GraspingTwin
+
+Array = np.ndarray
+
+HIGHEST = 0.45  # m, of a goal above the table
+
+
+class FetchPickAndPlace(FetchObject, GraspingTwin):
+    """Half of the goals lie up to 45 cm above the table; solved within 5 cm of the goal."""
+
+    original = "FetchPickAndPlace-v4"
+    hand: ClassVar[OpenHand] = OpenHand((1.341935, 0.749101, 0.534725))
+    draw_count = FetchObject.draw_count + NEAR_GRASP_DRAWS
+    shaping = {"success": 1.0, "distance": 10.0, "reach": 5.0, "grasp": 1.0}
+
+    def object(self) -> Body:
+        """The cube."""
+        return cube()
+
+    def start(self, world: World, mask: Array, draws: Array) -> Array:
+        """The object at least 10 cm beside the hand."""
+        draws, near = np.split(draws, [FetchObject.draw_count], axis=1)
+        goals = super().start(world, mask, draws)
+        goals[:, 2] += np.where(draws[:, -2] < 0.5, HIGHEST * draws[:, -1], 0.0)
+        start_near_grasps(world, mask, near, self.near_grasp_start_prob, self.hand.pads, HALF)
+        return goals
+
+    def guidance(
+        self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
+    ) -> dict[str, Array]:
+        """`reach`: minus the distance in m from the hand to the cube.
+
+        `grasp`: 1 where the fingers are closed on the cube.
+        """
+        offset = distance(self.hand.position(now), achieved)
+        opening, _ = self.hand.fingers(now)
+        closed = (offset < 0.02) & (opening < HALF + 0.002)
+        return {"reach": -offset, "grasp": closed.astype(float)}

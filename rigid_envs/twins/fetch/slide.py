@@ -1,0 +1,90 @@
+"""FetchSlide: the closed fingers hit a puck, which slides to a goal out of reach.
+
+The puck of the original touches the table with one or two points, sinks 6 mm into it and tumbles a
+little. So how the table brakes it is taken from recorded slides, not from a coefficient: MuJoCo's
+friction pyramid limits the sum of the forces along x and y, and a slow puck is braked in proportion
+to its speed.
+"""
+
+import numpy as np
+
+from physics import Body, Cylinder, Material, Readout, World
+from rigid_envs.tasks.rewards import distance
+from rigid_envs.twins.fetch.hand import HAND, OBJECT, ClosedHand
+from rigid_envs.twins.fetch.task import FetchObject
+
+Array = np.ndarray
+
+RADIUS, HALF_HEIGHT, MASS = 0.025, 0.02, 2.0  # m, m and kg, of the puck
+REACH = 0.15  # m along x from the hand's start; beyond it the hand need not follow the puck
+
+# identified by `python -m benchmarks.twins identify`
+SLIDING = 0.98  # m/s^2, largest sum of the decelerations along x and y
+CREEPING = 3.4  # 1/s, deceleration per speed of a slow puck
+
+# of the prediction where a puck stops
+_STEP, _STEPS = 0.1, 15  # s
+
+
+class FetchSlide(FetchObject):
+    """The middle of the goals lies 40 cm ahead of the hand; solved within 5 cm of the goal."""
+
+    original = "FetchSlide-v4"
+    hand = ClosedHand((0.992692, 0.749043, 0.412662))
+    start_range = 0.1
+    goal_range = 0.3
+    goal_offset = 0.4
+    start_height = 0.414023
+    goal_height = 0.41401894
+    ground = start_height - HALF_HEIGHT
+    ground_friction = 0.0  # see `braking`
+    shaping = {"success": 1.0, "aim": 10.0, "reach": 1.0}
+
+    def object(self) -> Body:
+        """The puck."""
+        return Body(
+            Cylinder(RADIUS, HALF_HEIGHT), mass=MASS, position=(0.9, 0.75, self.start_height),
+            material=Material(friction=1.0, restitution=0.0), name="puck",
+            group=OBJECT, mask=OBJECT | HAND,
+        )  # fmt: skip
+
+    def act(self, world: World, now: Readout, actions: Array) -> None:
+        """Moves the hand by up to 5 cm along each axis; the table brakes the puck."""
+        super().act(world, now, actions)
+        force = np.zeros((world.count, 3))
+        force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2])
+        world.apply_wrench(force, body="puck")
+
+    def guidance(
+        self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
+    ) -> dict[str, Array]:
+        """`aim`: minus the distance in m from the goal to the place where the puck will stop.
+
+        `reach`: as in the other tasks, until the puck is out of reach.
+        """
+        stop = np.array(achieved, dtype=float)
+        stop[:, :2] = stopping_point(stop[:, :2], now.linear_velocity[:, 0, :2])
+        reach = super().guidance(world, now, achieved, desired, goal_distance)["reach"]
+        gone = achieved[:, 0] > self.hand.start[0] + REACH
+        return {"aim": -distance(stop, desired), "reach": np.where(gone, 0.0, reach)}
+
+
+def braking(velocity: Array, sliding: float = SLIDING, creeping: float = CREEPING) -> Array:
+    """Acceleration [n, 2] m/s^2 of a puck that slides with a velocity [n, 2] m/s.
+
+    Of those that the pyramid allows, |x| + |y| <= sliding, the one nearest to -creeping v.
+    """
+    wanted = creeping * np.abs(velocity.astype(float))
+    excess = np.maximum(wanted.sum(axis=1, keepdims=True) - sliding, 0.0)
+    nearest = np.minimum(np.maximum(wanted - 0.5 * excess, 0.0), sliding)
+    return -np.sign(velocity) * nearest
+
+
+def stopping_point(position: Array, velocity: Array) -> Array:
+    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will stop."""
+    velocity = velocity.astype(float)
+    for _ in range(_STEPS):
+        after = velocity + _STEP * braking(velocity)
+        position = position + 0.5 * _STEP * (velocity + after)
+        velocity = after
+    return position

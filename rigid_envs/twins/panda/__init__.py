@@ -1,0 +1,1 @@
+"""Twins of the environments of panda-gym (PyBullet)."""

@@ -1,0 +1,114 @@
+"""Hands and objects of twins move as recorded in the originals, as far as docs/twins.md says."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from benchmarks.twins.recordings import Recording
+from benchmarks.twins.replay import OBJECT, body_errors, hand_errors, replay
+from physics import Box, Drive, Scene, World
+from rigid_envs.twins import TWINS
+from rigid_envs.twins.fetch.slide import CREEPING, SLIDING, braking, stopping_point
+from rigid_envs.twins.fetch.task import rotation as fetch_rotation
+from rigid_envs.twins.panda.task import rotation as panda_rotation
+from rigid_envs.twins.servo import Servo
+
+
+@pytest.mark.parametrize(
+    ("name", "twin", "median"),
+    [("fetch-axes", "fetch_reach", 2e-3), ("fetch-motions", "fetch_reach", 3e-3),
+     ("panda-axes", "panda_reach", 8e-3), ("panda-motions", "panda_reach", 12e-3)],
+)  # fmt: skip
+def test_the_hand_is_where_the_original_is_after_twelve_steps(name, twin, median):
+    recording = Recording.load(name)
+    errors = hand_errors(recording, replay(recording, TWINS[twin]()))
+    moved = np.linalg.norm(np.diff(recording.observations[[0, 12], :, :3], axis=0), axis=2)
+    assert np.median(errors) < median < 0.2 * np.median(moved)
+
+
+def test_fetch_pushes_a_cube_to_where_the_original_does():
+    recording = Recording.load("fetch-pushes")
+    errors = body_errors(recording, replay(recording, TWINS["fetch_push"]()), OBJECT["fetch"])
+    assert np.median(errors) < 0.02
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(54.0, 1.12), (50.0, 1.0), (17.0, 0.28)])
+def test_a_servo_of_the_engine_follows_the_formula(frequency, damping):
+    servo, time = Servo(frequency, damping), 0.04
+    exact = expm(time * np.array([[0, 1], [-(frequency**2), -2 * damping * frequency]]))
+    assert servo.transition(time) == pytest.approx(exact, abs=1e-9)
+    drive = Drive(Box((0.01,) * 3), mass=1.0, force_limit=1e6, frequency=frequency,
+                  damping_ratio=damping)  # fmt: skip
+    world = World(Scene(bodies=[], drives=[drive]), "balanced", 1)
+    moved, end = np.array([[0.03, -0.02, 0.01]]), np.array([[0.5, -1.0, 0.0]])
+    velocity = np.array([[0.2, 0.1, -0.4]])
+    world.set_state(drive_velocity=velocity[:, None])
+    substep = world.fidelity.substep
+    ahead, speed = servo.moving(time, substep, moved, velocity, end)
+    world.move_drives(ahead[:, None], 0.0)
+    world.move_drives((ahead + time * speed)[:, None], time)
+    world.advance(time)
+    assert world.drive_position[0] == pytest.approx(moved, abs=1e-9)
+    assert world.drive_velocity[0] == pytest.approx(end, abs=1e-8)
+    # and a set point at rest; the engine's law is that of the formula for short substeps
+    world.set_state(drive_position=np.zeros((1, 1, 3)), drive_velocity=velocity[:, None])
+    world.move_drives(servo.ahead(time, substep, moved, velocity)[:, None], 0.0)
+    world.advance(time)
+    assert world.drive_position[0] == pytest.approx(moved, abs=1e-9)
+    assert servo.transition(time, 1e-6) == pytest.approx(exact, rel=1e-3)
+    position, rate = servo.answer(time, 0.05, 0.3)
+    assert [position - 0.05, rate] == pytest.approx(exact @ [-0.05, 0.3])
+
+
+def test_friction_of_the_puck_is_that_of_a_pyramid():
+    fast = np.array([[1.0, 0.0], [0.0, -1.0], [0.8, 0.8], [1.2, 0.3]])
+    found = braking(fast)
+    assert np.abs(found).sum(axis=1) == pytest.approx(np.full(4, SLIDING))
+    assert found[2] == pytest.approx([-0.5 * SLIDING, -0.5 * SLIDING])
+    assert found[3] == pytest.approx([-SLIDING, 0.0])  # the faster component first
+    # along an axis: v^2 / 2a down to the speed from which it creeps on
+    v, a, k = 1.0, SLIDING, CREEPING
+    far = (v * v - (a / k) ** 2) / (2.0 * a) + a / k**2
+    assert stopping_point(np.zeros((1, 2)), np.array([[v, 0.0]]))[0] == pytest.approx(
+        [far, 0.0], rel=0.05
+    )
+
+
+def test_angles_are_those_of_the_originals():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = rng.normal(size=(1, 4))
+        q /= np.linalg.norm(q)
+        x, y, z, w = q[0]
+        R = np.array([
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ])  # fmt: skip
+
+        def turns(a, b, c):
+            X = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+            Y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+            Z = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
+            return X, Y, Z
+
+        X, Y, Z = turns(*fetch_rotation(q)[0])
+        assert pytest.approx(R) == X @ Y @ Z
+        X, Y, Z = turns(*panda_rotation(q)[0])
+        assert pytest.approx(R) == Z @ Y @ X
+
+
+def test_starts_around_the_object_are_for_training_only():
+    for name in ("fetch_pick_and_place", "panda_pick_and_place"):
+        usual, near = TWINS[name](), TWINS[name](near_grasp_start_prob=1.0)
+        draws = np.random.default_rng(0).random((5, near.draw_count))
+        offsets = []
+        for task in (usual, near):
+            world = World(task.scene(), "balanced", 5)
+            task.start(world, np.ones(5, dtype=bool), draws)
+            now = world.read()
+            offsets.append(task.hand.position(now) - now.position[:, 0])
+        assert np.abs(offsets[0]).max(axis=1).min() > 0.05
+        assert np.abs(offsets[1]).max() < 0.031
+    with pytest.raises(ValueError, match="near_grasp_start_prob"):
+        TWINS["panda_stack"](near_grasp_start_prob=2.0)
