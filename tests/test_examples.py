@@ -5,11 +5,17 @@ import os
 import runpy
 import subprocess
 import sys
+import types
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+
+import rigid_envs  # noqa: F401  (registers the ids)
+from training.policies import trained_policy
+from training.policies.policy import Policy
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -42,6 +48,20 @@ def test_its_normaliser_has_the_mean_and_variance_of_all_that_it_saw(ppo):
     together = np.concatenate(batches)
     np.testing.assert_allclose(normalizer.mean, together.mean(axis=0), rtol=1e-4)
     np.testing.assert_allclose(normalizer.variance, together.var(axis=0), rtol=1e-2)
+
+
+def test_a_policy_acts_in_a_script_of_fetch(monkeypatch, capsys):
+    """With the twin in place of the original, which is another suite's."""
+    original = types.ModuleType("gymnasium_robotics")
+    monkeypatch.setitem(sys.modules, "gymnasium_robotics", original)
+    monkeypatch.setitem(gym.registry, "FetchPush-v4", gym.spec("RigidEnvs/FetchPush-v0"))
+    still = Policy(lambda batch: np.zeros((len(batch["observation"]), 4)), "", "still")
+    monkeypatch.setattr(trained_policy, "trained_policy", lambda path: still)
+    monkeypatch.setattr(sys, "argv", ["fetch_push.py", "push.safetensors"])
+    runpy.run_path(str(EXAMPLES / "fetch_push.py"))
+    solved, _, rest = capsys.readouterr().out.partition(" of ")
+    assert rest == "20 episodes solved\n"
+    assert int(solved) < 8  # goals may be near a cube that rests
 
 
 def test_the_notebook_runs_from_top_to_bottom_in_any_folder(tmp_path):

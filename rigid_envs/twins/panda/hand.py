@@ -20,8 +20,8 @@ SERVO = Servo(50.0, 1.0)
 MASS = 10.0  # kg
 FORCE = 1e4  # N
 
-# of the fingers' mesh, its lower part. It narrows towards the tip, from 26 to 14 mm along y; these are
-# the dimensions 27 mm above the tip, where a hand at an object's height meets its upper edge
+# of the fingers' mesh, its lower part. It narrows towards the tip, from 26 to 14 mm along y; these
+# are the dimensions 27 mm above the tip, where a hand at an object's height meets its upper edge
 LENGTH, TIP = 0.05, 0.0072  # m; the tip is that much below the end effector
 HALF_DEPTH, THICKNESS = 0.0102, 0.022  # m, of a finger along x and y
 _OFFSET = np.array([0.0, 0.0, 0.5 * LENGTH - TIP])

@@ -1,10 +1,17 @@
 """PandaSlide: the closed fingers hit a puck, which slides to a goal out of reach."""
 
-from physics import Body, Cylinder, Material
-from rigid_envs.twins.panda.task import FRICTION, PandaObject, observed
+import numpy as np
+
+from physics import Body, Cylinder, Material, Readout, World
+from rigid_envs.tasks.rewards import distance
+from rigid_envs.twins.panda.task import FRICTION, PandaObject, behind, observed
+
+Array = np.ndarray
 
 RADIUS, HALF_HEIGHT = 0.03, 0.015  # m, of the puck
 PUCK_FRICTION = 0.02  # Coulomb's coefficient of puck and table
+GRAVITY = 9.81  # m/s^2
+REACH = 0.2  # m along x; beyond it the hand need not follow the puck
 
 
 class PandaSlide(PandaObject):
@@ -18,6 +25,7 @@ class PandaSlide(PandaObject):
     start_height = 2.0 * HALF_HEIGHT
     goal_height = 2.0 * HALF_HEIGHT
     goal_offset = 0.4
+    shaping = {"aim": 10.0, "reach": 3.0, "time": -1.0}
 
     def bodies(self) -> list[Body]:
         """A puck of 1 kg."""
@@ -28,3 +36,23 @@ class PandaSlide(PandaObject):
                 material=material, name="puck",
             )
         ]  # fmt: skip
+
+    def guidance(
+        self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
+    ) -> dict[str, Array]:
+        """`aim`: minus the distance in m from the goal at which the puck will pass it.
+
+        `reach`: as in the other tasks, until the puck is out of reach.
+        """
+        velocity = now.linear_velocity[:, 0, :2].astype(float)
+        speed = np.sqrt(np.sum(velocity**2, axis=1))
+        ahead = velocity / np.maximum(speed, 1e-9)[:, None]
+        to_goal = (desired - achieved)[:, :2]
+        # how far it will be when it passes the goal, or when it stops before
+        way = np.clip(
+            np.sum(to_goal * ahead, axis=1), 0.0, speed**2 / (2.0 * PUCK_FRICTION * GRAVITY)
+        )
+        miss = np.sqrt(np.sum((to_goal - ahead * way[:, None]) ** 2, axis=1))
+        reach = distance(self.hand.position(now), behind(achieved, desired))
+        gone = achieved[:, 0] > REACH
+        return {"aim": -miss, "reach": np.where(gone, 0.0, -reach)}

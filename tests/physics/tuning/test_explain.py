@@ -108,7 +108,8 @@ def test_the_speed_that_passes_through_is_half_a_width_per_substep():
 
 
 def test_costs_add_up_to_the_whole():
-    course, wholes, substeps = Course(CUBE, 5, 0.02, 16), [], []
+    # as many worlds as explain takes: the memory of fewer stays in the cache
+    course, wholes, substeps = Course(CUBE, 5, 0.02, 16 * 32), [], []
     for _ in range(3):
         text = section(Fidelity().explain(CUBE), "Cost")
         costs = {line.split("  ")[1].strip():

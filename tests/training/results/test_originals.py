@@ -65,6 +65,7 @@ def test_episodes_are_counted_as_at_home(tmp_path, monkeypatch):
 
 
 def test_what_is_missing_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(originals, "INTERPRETER", tmp_path / "none")  # `make twins` may have run
     with pytest.raises(
         UsageError, match=r"lacks it; run `make twins`, or `.*pip install panda-gym"
     ):
