@@ -54,8 +54,8 @@ class ClosedHand:
 
     start: Vector
 
-    # kg. The original's hand weighs some 400 kg to what it meets; 40 kg are as steady to an object
-    # of 2 kg, and squash it less where it is in the way
+    # kg, chosen, not measured. By the model's inverse weight and impedance the original's hand
+    # weighs some 400 kg to what it meets; a lighter one squashes an object less that is in the way
     MASS: ClassVar[float] = 40.0
 
     def drive(self) -> Drive:
@@ -96,10 +96,10 @@ class OpenHand:
 
     start: Vector
 
-    # kg. Light enough that the grip's force closes the fingers as fast as the original's
+    # kg, chosen: light enough that the limited grip still closes the fingers in a few steps
     MASS: ClassVar[float] = 10.0
-    # N of each finger. The original presses with up to 720 N, which would squash the object: its
-    # contacts are about five times as stiff
+    # N of each finger, chosen. The original's spring presses with up to 720 N, which would squash
+    # the object here
     GRIP: ClassVar[float] = 150.0
 
     def drive(self) -> Gripper:

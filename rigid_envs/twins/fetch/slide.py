@@ -20,7 +20,7 @@ REACH = 0.15  # m along x from the hand's start; beyond it the hand need not fol
 
 # identified by `python -m benchmarks.twins identify`
 SLIDING = 0.98  # m/s^2, largest sum of the decelerations along x and y
-CREEPING = 3.4  # 1/s, deceleration per speed of a slow puck
+CREEPING = 3.73  # 1/s, deceleration per speed of a slow puck
 
 # of the prediction where a puck stops
 _STEP, _STEPS = 0.1, 15  # s

@@ -15,7 +15,7 @@ from rigid_envs.twins.servo import Servo, move_set_points
 Array = np.ndarray
 
 START = np.array([0.038440, 0.0, 0.197400])  # m, of the end effector
-# slow enough that the hand doesn't jerk within a step, which would throw an object out of the grip
+# chosen: slow enough that the hand doesn't jerk within a step, which threw cubes out of the grip
 SERVO = Servo(50.0, 1.0)
 MASS = 10.0  # kg
 FORCE = 1e4  # N
@@ -68,7 +68,8 @@ class OpenHand:
     WIDEST: ClassVar[float] = 0.04  # m, how far a finger opens
     OPENED: ClassVar[float] = 0.088  # m, how far a free finger moves in a step at full action
     HALF: ClassVar[float] = 0.01  # m, half the thickness of a finger
-    # N of each finger. The original presses with 170 N, which would squash the object
+    # N of each finger, chosen. The original's motors press with up to 170 N, which would squash the
+    # object here
     GRIP: ClassVar[float] = 80.0
     # so that the grip holds as well as 170 N with the original's coefficient of 0.5
     FRICTION: ClassVar[float] = 4.5
