@@ -1,7 +1,8 @@
 """Gymnasium environments on the rigid-body engine `physics`.
 
-Importing this package registers the ids `RigidEnvs/Push-v0`, `RigidEnvs/PushT-v0`,
-`RigidEnvs/Reach-v0`, `RigidEnvs/Slide-v0`, `RigidEnvs/Stack-v0` and `RigidEnvs/Throw-v0`, twins of
+Importing this package registers the ids `RigidEnvs/PickAndPlace-v0`, `RigidEnvs/Push-v0`,
+`RigidEnvs/PushT-v0`, `RigidEnvs/Reach-v0`, `RigidEnvs/Slide-v0`, `RigidEnvs/Stack-v0` and
+`RigidEnvs/Throw-v0`, twins of
 other suites' environments, such as `RigidEnvs/FetchPush-v0` and `RigidEnvs/PandaPush-v0`, and the
 same ids with a dense reward, such as `RigidEnvs/PushDense-v0`.
 `gym.register_envs` has no effect, but shows linters that the import is used:

@@ -9,6 +9,7 @@ from rigid_envs.twins import TWINS
 
 # names in ids: those of tasks
 NAMES = {
+    "PickAndPlace": "pick_and_place",
     "Push": "push",
     "PushT": "push_t",
     "Reach": "reach",

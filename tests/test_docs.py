@@ -9,7 +9,7 @@ import pytest
 from physics.tuning import tune as tuning
 from rigid_envs import RigidEnv, RigidVectorEnv
 from rigid_envs.episodes.arguments import argument_names
-from rigid_envs.tasks import TASKS, Push, PushT, Reach, Slide, Stack, Throw
+from rigid_envs.tasks import TASKS, PickAndPlace, Push, PushT, Reach, Slide, Stack, Throw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -47,7 +47,9 @@ def test_a_task_of_ones_own_takes_less_than_a_hundred_lines(capsys, tmp_path, mo
 
 
 @pytest.mark.parametrize(
-    "task", [Push(), PushT(), Reach(), Slide(), Stack(2), Throw()], ids=lambda t: type(t).__name__
+    "task",
+    [PickAndPlace(), Push(), PushT(), Reach(), Slide(), Stack(2), Throw()],
+    ids=lambda t: type(t).__name__,
 )
 def test_the_observation_table_has_a_row_for_every_index(task):
     text = (ROOT / "docs" / "environments" / f"{type(task).__name__.lower()}.md").read_text()

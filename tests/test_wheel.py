@@ -44,7 +44,7 @@ def test_wheel_holds_every_module_and_setting(wheel):
         assert f"{folder}/py.typed" in names
     settings = {f"training/configs/{file.name}" for file in (ROOT / "configs").glob("*.yaml")}
     assert {"training/configs/ppo.yaml", "training/configs/sac.yaml"} <= settings <= names
-    for task in ("Push", "PushT", "Reach", "Slide", "Stack", "Throw"):
+    for task in ("PickAndPlace", "Push", "PushT", "Reach", "Slide", "Stack", "Throw"):
         assert f"training/shipped/ppo/RigidEnvs-{task}-v0_seed0/policy.safetensors" in names
 
 

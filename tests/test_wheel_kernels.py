@@ -30,7 +30,7 @@ for name in sys.argv[1:]:
         env.reset(seed=0)
         env.step(env.action_space.sample())
 """
-TASKS = ("Push", "PushT", "Reach", "Slide", "Stack", "Throw")
+TASKS = ("PickAndPlace", "Push", "PushT", "Reach", "Slide", "Stack", "Throw")
 
 
 @pytest.fixture(scope="module")

@@ -38,6 +38,7 @@ class Strip(NamedTuple):
 
 
 STRIPS = {
+    "pickandplace": Strip("PickAndPlace", 1_000_001, (0, 8, 14, 24), {}),
     "push": Strip("Push", 1_000_008, (0, 7, 13, 27), {}),
     "pusht": Strip("PushT", 1_000_009, (0, 12, 30, 60), {}),
     "reach": Strip("Reach", 1_000_001, (0, 2, 5), {}),

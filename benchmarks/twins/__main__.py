@@ -13,11 +13,13 @@ def main() -> None:
     parser.add_argument(
         "command", choices=("record", "identify", "compare"),
         help="record: play scripts in the originals, and write what happened to data/; identify: "
-        "print what twins take from it, and train the Panda arm; compare: print how far twins "
+        "print what twins take from it, and train the arms; compare: print how far twins "
         "differ from what was recorded",
     )  # fmt: skip
     parser.add_argument("--python", type=Path, help="interpreter that has the originals")
-    parser.add_argument("--arm", action="store_true", help="identify: the Panda arm, too (7 min)")
+    parser.add_argument(
+        "--arms", action="store_true", help="identify: the arms, too (15 min, 14 GB of memory)"
+    )
     options = parser.parse_args()
     if options.command == "record":
         for name, kind in recordings.KINDS.items():
@@ -27,13 +29,17 @@ def main() -> None:
             recordings.save_starts(twin.original, options.python)
             print(f"starts of {twin.original}")
     elif options.command == "identify":
-        frequency, damping, stride, sag = identify.servo(recordings.Recording.load("fetch-motions"))
-        print(f"Fetch hand: frequency {frequency:.1f} rad/s, damping ratio {damping:.2f}, stride "
-              f"{1e3 * stride:.1f} mm, sag {1e3 * sag.round(5)} mm")  # fmt: skip
-        sliding, creeping = identify.braking(recordings.Recording.load("fetch-slides"))
-        print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s")
-        if options.arm:
-            print(f"Panda arm: {identify.panda_arm(options.python)}")
+        frequency, damping = identify.servo(recordings.Recording.load("fetch-motions"))
+        print(f"Fetch hand: frequency {frequency:.1f} rad/s, damping ratio {damping:.2f}")
+        sliding, creeping = identify.pressing(recordings.Recording.load("fetch-presses"))
+        print(f"it presses on the table: sliding {sliding:.2f}, creeping {creeping:.2f}")
+        slides = recordings.Recording.load("fetch-slides")
+        sliding, creeping, gliding = identify.braking(slides)
+        print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
+              f"gliding {gliding:.3f} m/s")  # fmt: skip
+        if options.arms:
+            for name, robot in identify.ROBOTS.items():
+                print(f"{name} arm: {identify.arm(robot, options.python)}")
     else:
         print("\n".join(replay.summary()))
 

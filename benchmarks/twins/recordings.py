@@ -67,6 +67,7 @@ KINDS = {
         "FetchReach-v4", 20, 49,
         lambda n, size: scripts.wandering(n, size, FETCH_LOW, FETCH_HIGH, 0),
     ),
+    "fetch-presses": Kind("FetchReach-v4", 20, 20, scripts.pressing),
     "fetch-pushes": Kind(
         "FetchPush-v4", 50, 49,
         lambda n, size: scripts.pushing(n, size, 3, 0.5, 0.418, 0.075, 0.03, 0),

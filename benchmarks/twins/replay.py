@@ -61,10 +61,12 @@ def body_errors(recording: Recording, found: Replay, first: int) -> Array:
     return np.asarray(np.linalg.norm(offset, axis=1))
 
 
+PRESSED = 20  # steps after which hands have moved along the table for five
 # recordings by name: the twin that plays them
 REPLAYED = {
     "fetch-axes": "fetch_reach",
     "fetch-motions": "fetch_reach",
+    "fetch-presses": "fetch_reach",
     "fetch-pushes": "fetch_push",
     "fetch-slides": "fetch_slide",
     "panda-axes": "panda_reach",
@@ -74,7 +76,7 @@ REPLAYED = {
 
 
 def summary() -> list[str]:
-    """A line for each recording: the errors of the hand after 12 steps, and of the object."""
+    """A line for each recording: the errors of the hand after some steps, or of the object."""
     lines = []
     for name, twin in REPLAYED.items():
         recording = Recording.load(name)
@@ -88,9 +90,10 @@ def summary() -> list[str]:
                 f"{np.quantile(errors, 0.9):6.1f} mm; {moved.sum()} of {len(moved)} moved"
             )
         else:
-            errors = 1e3 * hand_errors(recording, found)
+            steps = PRESSED if name == "fetch-presses" else 12
+            errors = 1e3 * hand_errors(recording, found, steps)
             parts.append(
-                f"hand after 12 steps: median {np.median(errors):6.2f} mm, at most "
+                f"hand after {steps} steps: median {np.median(errors):6.2f} mm, at most "
                 f"{errors.max():6.2f} mm"
             )
         lines.append(" ".join(parts))

@@ -46,6 +46,27 @@ def wandering(worlds: int, size: int, low: Array, high: Array, seed: int) -> Act
     return act
 
 
+PRESSES = (0.0, -0.1, -0.2, -0.5, -1.0)
+ALONG = (0.1, 0.2, 0.5, 1.0)
+
+
+def pressing(worlds: int, size: int) -> Actor:
+    """Lowers hands onto the table, then moves them along y while they press on it.
+
+    World i presses with PRESSES[i % 5] and moves with ALONG[i // 5 % 4].
+    """
+    down = np.array(PRESSES)[np.arange(worlds) % len(PRESSES)]
+    along = np.array(ALONG)[np.arange(worlds) // len(PRESSES) % len(ALONG)]
+
+    def act(observations: dict[str, Array], step: int) -> Array:
+        actions = np.zeros((worlds, size))
+        actions[:, 2] = -0.5 if step < 12 else down
+        actions[:, 1] = along if step >= 15 else 0.0
+        return actions
+
+    return act
+
+
 def pushing(
     worlds: int, size: int, at: int, safe: float, low: float, gap: float, stop: float, seed: int
 ) -> Actor:

@@ -1,5 +1,6 @@
 """The tasks: initial state, actions, observation, goal and reward terms in NumPy."""
 
+from rigid_envs.tasks.grasping.pick_and_place import PickAndPlace
 from rigid_envs.tasks.push import Push
 from rigid_envs.tasks.push_t import PushT
 from rigid_envs.tasks.reach import Reach
@@ -9,6 +10,7 @@ from rigid_envs.tasks.task import Task
 from rigid_envs.tasks.throw import Throw
 
 TASKS: dict[str, type[Task]] = {
+    "pick_and_place": PickAndPlace,
     "push": Push,
     "push_t": PushT,
     "reach": Reach,
@@ -17,4 +19,4 @@ TASKS: dict[str, type[Task]] = {
     "throw": Throw,
 }
 
-__all__ = ["TASKS", "Push", "PushT", "Reach", "Slide", "Stack", "Task", "Throw"]
+__all__ = ["TASKS", "PickAndPlace", "Push", "PushT", "Reach", "Slide", "Stack", "Task", "Throw"]

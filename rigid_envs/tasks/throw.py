@@ -7,7 +7,7 @@ import numpy as np
 from physics import Body, Fidelity, Ground, Material, Readout, Scene, Sphere, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import Goal, Mark, Marker
-from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.grasping.hand import Hand
 from rigid_envs.tasks.rewards import Reward, distance
 from rigid_envs.tasks.task import Task
 

@@ -64,15 +64,15 @@ class Servo:
         return (displacement - M[0, 1] * velocity) / (1.0 - M[0, 0])
 
     def moving(
-        self, time: float, substep: float, displacement: Array, velocity: Array, end: Array
+        self, time: float, substep: float, velocity: Array, displacement: Array, end: Array
     ) -> tuple[Array, Array]:
         """The moving set point that gives a displacement and an end velocity in `time` s.
 
         Args:
             time: s.
             substep: s, of the engine.
-            displacement: m.
             velocity: m/s, at the start.
+            displacement: m.
             end: m/s, at the end.
 
         Returns:

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Readout, World
-from physics.scene.validation import instance, number
+from physics.scene.validation import instance
 from rigid_envs.tasks.goals import Measure, points
 from rigid_envs.tasks.rewards import Reward
 from rigid_envs.tasks.task import Bounds, Task
@@ -64,23 +64,6 @@ class Twin(Task):
     ) -> dict[str, Array]:
         """The terms of `shaping` that don't follow from the goals, as `terms` returns them."""
         return {}
-
-
-class GraspingTwin(Twin):
-    """A twin in which the hand grasps.
-
-    Args:
-        shaped: see `Twin`.
-        near_grasp_start_prob: probability that an episode begins with the open hand around or just
-            above the object; for training.
-    """
-
-    def __init__(self, shaped: bool = False, near_grasp_start_prob: float = 0.0) -> None:
-        """Checks the probability."""
-        super().__init__(shaped)
-        self.near_grasp_start_prob = number(
-            "near_grasp_start_prob", near_grasp_start_prob, low=0.0, high=1.0
-        )
 
 
 def components(limit: float, *names: str) -> Bounds:

@@ -9,9 +9,9 @@ from gymnasium.vector import VectorEnv
 
 import rigid_envs  # noqa: F401  (registers the ids)
 
-NAMES = ("Push", "PushT", "Reach", "Slide", "Stack", "Throw")
+NAMES = ("PickAndPlace", "Push", "PushT", "Reach", "Slide", "Stack", "Throw")
 IDS = [f"RigidEnvs/{task}-v0" for task in NAMES]
-PUSH, PUSH_T, REACH, SLIDE, STACK, THROW = IDS
+PICK_AND_PLACE, PUSH, PUSH_T, REACH, SLIDE, STACK, THROW = IDS
 DENSE_IDS = [f"RigidEnvs/{task}Dense-v0" for task in NAMES]
 PRESETS = ["fast", "balanced", "accurate", "solid"]
 REWARDS = ["sparse", "dense"]

@@ -13,7 +13,15 @@ from rigid_envs.registration import NAMES, TWIN_NAMES, register
 from rigid_envs.tasks import TASKS, Push
 from tests.rigid_envs.rollout import DENSE_IDS, IDS, PUSH, STACK, assert_same, make, make_vec
 
-STEPS = {"push": 50, "push_t": 100, "reach": 25, "slide": 50, "stack": 100, "throw": 50}
+STEPS = {
+    "pick_and_place": 50,
+    "push": 50,
+    "push_t": 100,
+    "reach": 25,
+    "slide": 50,
+    "stack": 100,
+    "throw": 50,
+}
 
 
 def steps_of_an_episode(env, limit=250):

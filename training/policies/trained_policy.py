@@ -51,7 +51,7 @@ def shipped_policy(env_id: str) -> Policy:
 
 
 def trained_policy(
-    path: Path,
+    path: Path | str,
     *,
     algo: str | None = None,
     env_id: str | None = None,
@@ -81,6 +81,7 @@ def trained_policy(
     """
     if algo is not None and algo not in ALGORITHMS:
         raise UsageError(f"unknown algorithm {algo!r}; {one_of(algo, ALGORITHMS)}")
+    path = Path(path)
     check_exists(path, f'a run folder, a {SUFFIX} file, a model.zip, "{SHIPPED}" or "{SCRIPTED}"')
     exported = path / f"policy{SUFFIX}"
     if exported.is_file() and not (path / "run.json").exists():  # as the folders in results/

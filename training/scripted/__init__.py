@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from training.scripted.pick_and_place import pick_and_place
 from training.scripted.push import push
 from training.scripted.push_t import push_t
 from training.scripted.reach import reach
@@ -23,6 +24,7 @@ Controller = Callable[[dict[str, Array]], Array]
 """Takes observations `{key: [n, k]}` and returns actions [n, action_dim] within ±1."""
 
 CONTROLLERS: dict[str, Controller] = {
+    "pick_and_place": pick_and_place,
     "push": push,
     "push_t": push_t,
     "reach": reach,

@@ -7,7 +7,7 @@ actions, too, and can be imitated.
 
 import numpy as np
 
-from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.grasping.hand import Hand
 from rigid_envs.tasks.stack import Stack
 
 Array = np.ndarray

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.grasping.hand import Hand
 from rigid_envs.tasks.throw import GRAVITY, Throw
 
 Array = np.ndarray

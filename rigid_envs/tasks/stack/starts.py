@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.grasping.hand import Hand
 from rigid_envs.tasks.stack.tower import HALF
 
 Array = np.ndarray

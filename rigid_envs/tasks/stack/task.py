@@ -9,7 +9,7 @@ from physics import Body, Box, Fidelity, Ground, Material, Readout, Scene, World
 from physics.scene.validation import integer, number
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import BODY_COLORS, GOAL_COLOR, Ghost, Marker
-from rigid_envs.tasks.hand import Hand
+from rigid_envs.tasks.grasping.hand import Hand
 from rigid_envs.tasks.rewards import Reward
 from rigid_envs.tasks.stack.reward import WEIGHTS, reward_terms
 from rigid_envs.tasks.stack.starts import CELL_CENTERS, Grasp, built, hand_at_cube, random_cells

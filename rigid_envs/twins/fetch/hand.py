@@ -2,27 +2,34 @@
 
 In the originals a weld pulls the hand towards a mocap body. Each step puts that body 5 cm times the
 action ahead of where the hand is, so the hand answers a step; under load it hangs back, and nothing
-makes up for it. The weld holds the hand as a spring and damper would: a servo whose frequency,
-damping and stride `python -m benchmarks.twins identify` finds from recorded motions.
-
-The arm's weight and joint damping add a small pull, the sag. Frames: x forward, y left, z up.
+makes up for it. The weld holds the hand as a spring and damper would: a servo whose frequency and
+damping `python -m benchmarks.twins identify` finds from recorded motions. It is weaker where the
+arm is stretched, until the hand gets no farther. The table brakes a hand that presses on it: a fast
+one as Coulomb friction would; a slow one creeps, braked in proportion to its speed. Frames: x
+forward, y left, z up.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from physics import Box, Drive, Gripper, Material, Readout, World
+from rigid_envs.twins.arm import Arm
 from rigid_envs.twins.servo import Servo, move_set_points
 
 Array = np.ndarray
 Vector = tuple[float, float, float]
 
 # identified
-ARM = Servo(55.8, 1.09)
-STRIDE = 0.0499  # m, of the set point at full action
-SAG = np.array([-0.35e-3, 0.02e-3, -0.14e-3])  # m, of the set point
+ARM = Arm(Path(__file__).with_name("arm.npz"), centre=(1.02, 0.75, 0.57), extent=0.15, stride=0.05)
+SERVO = Servo(55.8, 1.09)
+BASE = 0.405  # m along x, of the robot's base in most tasks
+RESTING = 0.4195  # m, height of a hand that rests on the table
+# of a hand that presses on the table: loss of displacement along the table per lack of displacement
+# downwards where it slides, and the part that is lost where it creeps
+SLIDING, CREEPING = 0.95, 0.54
 
 # from the originals' model. Boxes of fingers are 1 mm larger: their contacts begin at that distance
 MARGIN = 1e-3  # m
@@ -50,9 +57,11 @@ class ClosedHand:
 
     Args:
         start: position of the grip site at the start of an episode, m.
+        base: m along x, of the robot's base.
     """
 
     start: Vector
+    base: float = BASE
 
     # kg, chosen, not measured. By the model's inverse weight and impedance the original's hand
     # weighs some 400 kg to what it meets; a lighter one squashes an object less that is in the way
@@ -63,14 +72,14 @@ class ClosedHand:
         return Drive(
             Box((HALF_DEPTH + MARGIN, CLOSED + HALF_WIDTH + MARGIN, _HALF_Z)),
             mass=self.MASS, force_limit=1e6, position=tuple(self.start + _OFFSET),
-            frequency=ARM.frequency, damping_ratio=ARM.damping,
+            frequency=SERVO.frequency, damping_ratio=SERVO.damping,
             material=Material(FRICTION, restitution=0.0), name="hand",
             group=HAND, mask=OBJECT | UNDER_HAND,
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by actions [count, 4]; the last component has no effect."""
-        ahead, speed = _follow(world, self.velocity(now), actions, frame)
+        ahead, speed = _follow(self, world, now, actions, frame)
         move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
 
     def position(self, now: Readout) -> Array:
@@ -92,9 +101,11 @@ class OpenHand:
 
     Args:
         start: position of the grip site at the start of an episode, m.
+        base: m along x, of the robot's base.
     """
 
     start: Vector
+    base: float = BASE
 
     # kg, chosen: light enough that the limited grip still closes the fingers in a few steps
     MASS: ClassVar[float] = 10.0
@@ -108,7 +119,7 @@ class OpenHand:
             Box((HALF_DEPTH + MARGIN, HALF_WIDTH + MARGIN, _HALF_Z)),
             mass=0.5 * self.MASS, force_limit=1e6, grip_limit=self.GRIP,
             position=tuple(self.start + _OFFSET), distance=2.0 * CLOSED,
-            frequency=ARM.frequency, damping_ratio=ARM.damping,
+            frequency=SERVO.frequency, damping_ratio=SERVO.damping,
             material=Material(FRICTION, restitution=0.0), name="hand",
             group=HAND, mask=OBJECT | UNDER_HAND,
         )  # fmt: skip
@@ -119,8 +130,8 @@ class OpenHand:
         target = np.clip(opening + actions[:, 3], 0.0, FARTHEST)
         moved, _ = FINGER.answer(frame, target - opening, velocity)
         moved = np.clip(opening + moved, 0.0, WIDEST) - opening
-        opening = opening + ARM.ahead(frame, world.fidelity.substep, moved, velocity)
-        ahead, speed = _follow(world, self.velocity(now), actions, frame)
+        opening = opening + SERVO.ahead(frame, world.fidelity.substep, moved, velocity)
+        ahead, speed = _follow(self, world, now, actions, frame)
         move_set_points(world, self.pads(self.position(now) + ahead, opening), speed, frame)
 
     def pads(self, position: Array, opening: Array) -> Array:
@@ -138,6 +149,10 @@ class OpenHand:
         """Velocity [count, 3] m/s."""
         return 0.5 * (now.linear_velocity[:, -2] + now.linear_velocity[:, -1])
 
+    def opening(self, now: Readout) -> Array:
+        """How far each finger is open, [count] m."""
+        return self.fingers(now)[0]
+
     def fingers(self, now: Readout) -> tuple[Array, Array]:
         """How far each finger is open [count], m, and its velocity [count], m/s."""
         position, velocity = now.position[:, -2:, 1], now.linear_velocity[:, -2:, 1]
@@ -147,7 +162,36 @@ class OpenHand:
         )
 
 
-def _follow(world: World, velocity: Array, actions: Array, frame: float) -> tuple[Array, Array]:
-    """Set point [n, 3] m, ahead of hands of a velocity [n, 3] m/s, and its velocity [n, 3] m/s."""
-    moved, end = ARM.answer(frame, STRIDE * actions[:, :3] + SAG, velocity)
-    return ARM.moving(frame, world.fidelity.substep, moved, velocity, end)
+def _follow(
+    hand: ClosedHand | OpenHand, world: World, now: Readout, actions: Array, frame: float
+) -> tuple[Array, Array]:
+    """How the set point must move for actions [n, 4] to have the arm's answer.
+
+    Returns:
+        How far ahead of the hand it starts, [n, 3] m, and its velocity, [n, 3] m/s.
+    """
+    position, velocity = hand.position(now), hand.velocity(now).astype(float)
+    moved, end = ARM.answer(
+        position - (hand.base, 0.0, 0.0), velocity, ARM.stride * actions[:, :3], frame
+    )
+    kept = braked(position[:, 2], moved)[:, None]
+    moved[:, :2] *= kept
+    end[:, :2] *= kept
+    return SERVO.moving(frame, world.fidelity.substep, velocity, moved, end)
+
+
+def braked(
+    height: Array, moved: Array, sliding: float = SLIDING, creeping: float = CREEPING
+) -> Array:
+    """Which part [n] of a displacement along the table is left to hands that press on it.
+
+    Args:
+        height: [n] m, of the hands.
+        moved: [n, 3] m, displacement in a step of hands that meet no table.
+        sliding: see `SLIDING`.
+        creeping: see `CREEPING`.
+    """
+    along = np.sqrt(np.sum(moved[:, :2] ** 2, axis=1)) + 1e-9
+    below = np.maximum(RESTING - np.maximum(height, RESTING) - moved[:, 2], 0.0) + 1e-9
+    loss = 1.0 / np.sqrt((creeping * along) ** -2 + (sliding * below) ** -2)
+    return np.asarray(1.0 - loss / along)

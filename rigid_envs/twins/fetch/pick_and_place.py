@@ -5,12 +5,11 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Body, Readout, World
-from rigid_envs.tasks.rewards import distance
+from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
 from rigid_envs.twins.fetch.hand import OpenHand
 from rigid_envs.twins.fetch.push import HALF, cube
 from rigid_envs.twins.fetch.task import FetchObject
-from rigid_envs.twins.near_grasps import NEAR_GRASP_DRAWS, start_near_grasps
-from rigid_envs.twins.twin import GraspingTwin
+from rigid_envs.twins.grasping_twin import GraspingTwin
 
 Array = np.ndarray
 
@@ -22,6 +21,7 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
 
     original = "FetchPickAndPlace-v4"
     hand: ClassVar[OpenHand] = OpenHand((1.341935, 0.749101, 0.534725))
+    half = HALF
     draw_count = FetchObject.draw_count + NEAR_GRASP_DRAWS
     shaping = {"success": 1.0, "distance": 10.0, "reach": 5.0, "grasp": 1.0}
 
@@ -34,17 +34,11 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
         draws, near = np.split(draws, [FetchObject.draw_count], axis=1)
         goals = super().start(world, mask, draws)
         goals[:, 2] += np.where(draws[:, -2] < 0.5, HIGHEST * draws[:, -1], 0.0)
-        start_near_grasps(world, mask, near, self.near_grasp_start_prob, self.hand.pads, HALF)
+        self.start_near_grasps(world, mask, near)
         return goals
 
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`reach`: minus the distance in m from the hand to the cube.
-
-        `grasp`: 1 where the fingers are closed on the cube.
-        """
-        offset = distance(self.hand.position(now), achieved)
-        opening, _ = self.hand.fingers(now)
-        closed = (offset < 0.02) & (opening < HALF + 0.002)
-        return {"reach": -offset, "grasp": closed.astype(float)}
+        """Those of a grasp."""
+        return self.grasp_terms(now, achieved)

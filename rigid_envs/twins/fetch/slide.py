@@ -2,8 +2,8 @@
 
 The puck of the original touches the table with one or two points, sinks 6 mm into it and tumbles a
 little. So how the table brakes it is taken from recorded slides, not from a coefficient: MuJoCo's
-friction pyramid limits the sum of the forces along x and y, and a slow puck is braked in proportion
-to its speed.
+friction pyramid limits the sum of the forces along x and y, a slow puck is braked in proportion to
+its speed, and once it is as slow as a few centimetres per second it glides on.
 """
 
 import numpy as np
@@ -16,21 +16,22 @@ from rigid_envs.twins.fetch.task import FetchObject
 Array = np.ndarray
 
 RADIUS, HALF_HEIGHT, MASS = 0.025, 0.02, 2.0  # m, m and kg, of the puck
-REACH = 0.15  # m along x from the hand's start; beyond it the hand need not follow the puck
+REACH = 0.4  # m along x from the hand's start; beyond it the hand can't follow the puck
 
 # identified by `python -m benchmarks.twins identify`
 SLIDING = 0.98  # m/s^2, largest sum of the decelerations along x and y
-CREEPING = 3.73  # 1/s, deceleration per speed of a slow puck
+CREEPING = 5.12  # 1/s, deceleration of a slow puck per speed above that at which it glides
+GLIDING = 0.041  # m/s
 
-# of the prediction where a puck stops
-_STEP, _STEPS = 0.1, 15  # s
+# of the prediction where a puck will be: most episodes end that long after the hit
+_STEP, _STEPS = 0.1, 12  # s
 
 
 class FetchSlide(FetchObject):
     """The middle of the goals lies 40 cm ahead of the hand; solved within 5 cm of the goal."""
 
     original = "FetchSlide-v4"
-    hand = ClosedHand((0.992692, 0.749043, 0.412662))
+    hand = ClosedHand((0.992692, 0.749043, 0.412662), base=0.05)
     start_range = 0.1
     goal_range = 0.3
     goal_offset = 0.4
@@ -38,7 +39,7 @@ class FetchSlide(FetchObject):
     goal_height = 0.41401894
     ground = start_height - HALF_HEIGHT
     ground_friction = 0.0  # see `braking`
-    shaping = {"success": 1.0, "aim": 10.0, "reach": 1.0}
+    shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0}
 
     def object(self) -> Body:
         """The puck."""
@@ -58,30 +59,42 @@ class FetchSlide(FetchObject):
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`aim`: minus the distance in m from the goal to the place where the puck will stop.
+        """`aim`: minus the distance in m from the goal to the place where the puck will be.
+
+        `hit`: 1 where it will be at the goal, falling to 1/e at 5 cm.
 
         `reach`: as in the other tasks, until the puck is out of reach.
         """
-        stop = np.array(achieved, dtype=float)
-        stop[:, :2] = stopping_point(stop[:, :2], now.linear_velocity[:, 0, :2])
+        end = np.array(achieved, dtype=float)
+        end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2])
         reach = super().guidance(world, now, achieved, desired, goal_distance)["reach"]
         gone = achieved[:, 0] > self.hand.start[0] + REACH
-        return {"aim": -distance(stop, desired), "reach": np.where(gone, 0.0, reach)}
+        miss = distance(end, desired)
+        hit = np.exp(-((miss / self.threshold) ** 2))
+        return {"hit": hit, "aim": -miss, "reach": np.where(gone, 0.0, reach)}
 
 
-def braking(velocity: Array, sliding: float = SLIDING, creeping: float = CREEPING) -> Array:
+def braking(
+    velocity: Array,
+    sliding: float = SLIDING,
+    creeping: float = CREEPING,
+    gliding: float = GLIDING,
+) -> Array:
     """Acceleration [n, 2] m/s^2 of a puck that slides with a velocity [n, 2] m/s.
 
-    Of those that the pyramid allows, |x| + |y| <= sliding, the one nearest to -creeping v.
+    Of those that the pyramid allows, |x| + |y| <= sliding, the one nearest to that of a creeping
+    puck, -creeping v (1 - gliding / |v|).
     """
-    wanted = creeping * np.abs(velocity.astype(float))
+    speed = np.sqrt(np.sum(velocity.astype(float) ** 2, axis=1, keepdims=True))
+    above = 1.0 - gliding / np.maximum(speed, gliding)
+    wanted = creeping * above * np.abs(velocity)
     excess = np.maximum(wanted.sum(axis=1, keepdims=True) - sliding, 0.0)
     nearest = np.minimum(np.maximum(wanted - 0.5 * excess, 0.0), sliding)
     return -np.sign(velocity) * nearest
 
 
-def stopping_point(position: Array, velocity: Array) -> Array:
-    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will stop."""
+def predicted(position: Array, velocity: Array) -> Array:
+    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will be."""
     velocity = velocity.astype(float)
     for _ in range(_STEPS):
         after = velocity + _STEP * braking(velocity)

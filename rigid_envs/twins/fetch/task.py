@@ -10,7 +10,6 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.fetch.hand import (
     ACTIONS,
-    FRICTION,
     HAND,
     OBJECT,
     UNDER_HAND,
@@ -43,8 +42,8 @@ class FetchTask(Twin):
     camera = CAMERA
 
     def table_under_hand(self) -> Ground:
-        """The table as the hand meets it."""
-        return Ground(Material(FRICTION, 0.0), TABLE, "table under the hand", UNDER_HAND, HAND)
+        """The table as the hand meets it; `hand.braked` is its friction."""
+        return Ground(Material(0.0, 0.0), TABLE, "table under the hand", UNDER_HAND, HAND)
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis."""

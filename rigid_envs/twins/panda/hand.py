@@ -1,28 +1,34 @@
 """The hand of the Panda robot.
 
-`arm` says where a free hand would get in a step, and with which velocity; the set point of a servo
-is moved so that it gets there. Frames: x forward, y left, z up from the table's top.
+In the originals inverse kinematics turns a displacement of the hand into joint angles, and motors
+of limited torque drive the joints there: along y the hand moves 4 cm in a step, forward 2 cm, less
+where the arm is stretched, and it sinks meanwhile. Frames: x forward, y left, z up from the table's
+top.
 """
 
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from physics import Box, Drive, Gripper, Material, Readout, World
-from rigid_envs.twins.panda.arm import answer, asked_displacement
+from rigid_envs.twins.arm import Arm
 from rigid_envs.twins.servo import Servo, move_set_points
 
 Array = np.ndarray
 
+ARM = Arm(Path(__file__).with_name("arm.npz"), centre=(0.0, 0.0, 0.15), extent=0.15, stride=0.05)
 START = np.array([0.038440, 0.0, 0.197400])  # m, of the end effector
 # chosen: slow enough that the hand doesn't jerk within a step, which threw cubes out of the grip
 SERVO = Servo(50.0, 1.0)
 MASS = 10.0  # kg
 FORCE = 1e4  # N
+# groups: objects, the hand, and the table that only the hand touches
+OBJECT, HAND, UNDER_HAND = 1, 2, 4
 
 # of the fingers' mesh, its lower part. It narrows towards the tip, from 26 to 14 mm along y; these
 # are the dimensions 27 mm above the tip, where a hand at an object's height meets its upper edge
-LENGTH, TIP = 0.05, 0.0072  # m; the tip is that much below the end effector
+LENGTH, TIP = 0.05, 0.0038  # m; the tip is that much below the end effector, where it presses
 HALF_DEPTH, THICKNESS = 0.0102, 0.022  # m, of a finger along x and y
 _OFFSET = np.array([0.0, 0.0, 0.5 * LENGTH - TIP])
 
@@ -39,11 +45,14 @@ class ClosedHand:
             Box((HALF_DEPTH, THICKNESS, 0.5 * LENGTH)), mass=MASS, force_limit=FORCE,
             position=tuple(START + _OFFSET), frequency=SERVO.frequency,
             damping_ratio=SERVO.damping, material=Material(1.0, restitution=0.0), name="hand",
+            group=HAND, mask=OBJECT | UNDER_HAND,
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by actions [count, 3]."""
-        ahead, speed = _follow(world, self.position(now), self.velocity(now), actions, frame)
+        position, velocity = self.position(now), self.velocity(now)
+        free = ARM.answer(position, velocity, asked_displacement(position, actions), frame)
+        ahead, speed = SERVO.moving(frame, world.fidelity.substep, velocity, *free)
         move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
 
     def position(self, now: Readout) -> Array:
@@ -81,15 +90,17 @@ class OpenHand:
             grip_limit=self.GRIP, position=tuple(START + _OFFSET), distance=2.0 * self.HALF,
             frequency=SERVO.frequency, damping_ratio=SERVO.damping,
             material=Material(self.FRICTION, restitution=0.0), name="hand",
+            group=HAND, mask=OBJECT | UNDER_HAND,
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand and its fingers by actions [count, 4]; a grip of -1 closes."""
-        position, opening = self.position(now), 0.5 * self.width(now)
-        ahead, speed = _follow(world, position, self.velocity(now), actions, frame)
-        velocity = now.linear_velocity[:, -2:, 1]
+        position, velocity = self.position(now), self.velocity(now)
+        free = ARM.answer(position, velocity, asked_displacement(position, actions), frame)
+        ahead, speed = SERVO.moving(frame, world.fidelity.substep, velocity, *free)
+        opening, fingers = self.opening(now), now.linear_velocity[:, -2:, 1]
         moved = np.clip(opening + self.OPENED * actions[:, 3], 0.0, self.WIDEST) - opening
-        closing = 0.5 * (velocity[:, 0] - velocity[:, 1])
+        closing = 0.5 * (fingers[:, 0] - fingers[:, 1])
         opening = opening + SERVO.ahead(frame, world.fidelity.substep, moved, -closing)
         move_set_points(world, self.pads(position + ahead, opening), speed, frame)
 
@@ -113,20 +124,21 @@ class OpenHand:
         """Distance [count] m of the fingers."""
         return np.asarray(now.position[:, -1, 1] - now.position[:, -2, 1] - 2.0 * self.HALF)
 
+    def opening(self, now: Readout) -> Array:
+        """How far each finger is open, [count] m."""
+        return 0.5 * self.width(now)
+
     def observe(self, now: Readout, out: Array) -> None:
         """Writes position, velocity and width [count, 7]."""
         out[:, 0:3], out[:, 3:6] = self.position(now), self.velocity(now)
         out[:, 6] = self.width(now)
 
 
-def _follow(
-    world: World, position: Array, velocity: Array, actions: Array, frame: float
-) -> tuple[Array, Array]:
-    """How the set point must move for actions [n, 3 or 4] to have the arm's answer.
+def asked_displacement(position: Array, actions: Array) -> Array:
+    """Displacement [n, 3] m that actions [n, 3 or 4] ask of hands at [n, 3] m.
 
-    Returns:
-        How far ahead of the hand it starts, [n, 3] m, and its velocity, [n, 3] m/s.
+    The originals move the target up to the table's top if it is below.
     """
-    asked = asked_displacement(position, actions)
-    moved, end = answer(position, velocity, asked, frame)
-    return SERVO.moving(frame, world.fidelity.substep, moved, velocity, end)
+    asked = ARM.stride * actions[:, :3]
+    asked[:, 2] = np.maximum(asked[:, 2], -position[:, 2])
+    return np.asarray(asked)

@@ -5,11 +5,10 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Body, Readout, World
-from rigid_envs.tasks.rewards import distance
-from rigid_envs.twins.near_grasps import NEAR_GRASP_DRAWS, start_near_grasps
+from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
+from rigid_envs.twins.grasping_twin import GraspingTwin
 from rigid_envs.twins.panda.hand import OpenHand
 from rigid_envs.twins.panda.task import HALF, PandaObject, cube, observed
-from rigid_envs.twins.twin import GraspingTwin
 
 Array = np.ndarray
 
@@ -22,6 +21,7 @@ class PandaPickAndPlace(PandaObject, GraspingTwin):
 
     original = "PandaPickAndPlace-v3"
     hand: ClassVar[OpenHand] = OpenHand()
+    half = HALF
     actions = OpenHand.actions
     bounds = observed(hand, "object")
     draw_count = PandaObject.draw_count + 2 + NEAR_GRASP_DRAWS
@@ -36,16 +36,11 @@ class PandaPickAndPlace(PandaObject, GraspingTwin):
         goals = super().start(world, mask, draws)
         on_table, height, near = np.split(draws[:, PandaObject.draw_count :], [1, 2], axis=1)
         goals[:, 2:] += np.where(on_table < ON_TABLE, 0.0, HIGHEST * height)
-        start_near_grasps(world, mask, near, self.near_grasp_start_prob, self.hand.pads, HALF)
+        self.start_near_grasps(world, mask, near)
         return goals
 
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`reach`: minus the distance in m from the hand to the cube.
-
-        `grasp`: 1 where the fingers are closed on the cube.
-        """
-        offset, width = distance(self.hand.position(now), achieved), self.hand.width(now)
-        closed = (offset < HALF) & (np.abs(width - 2.0 * HALF) < 0.005)
-        return {"reach": -offset, "grasp": closed.astype(float)}
+        """Those of a grasp."""
+        return self.grasp_terms(now, achieved)

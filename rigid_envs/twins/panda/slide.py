@@ -4,12 +4,14 @@ import numpy as np
 
 from physics import Body, Cylinder, Material, Readout, World
 from rigid_envs.tasks.rewards import distance
+from rigid_envs.twins.panda.hand import HAND, OBJECT
 from rigid_envs.twins.panda.task import FRICTION, PandaObject, behind, observed
 
 Array = np.ndarray
 
-RADIUS, HALF_HEIGHT = 0.03, 0.015  # m, of the puck
+RADIUS, HALF_HEIGHT, MASS = 0.03, 0.015, 1.0  # m, m and kg, of the puck
 PUCK_FRICTION = 0.02  # Coulomb's coefficient of puck and table
+DAMPING = 0.04  # 1/s, deceleration per speed that PyBullet adds
 GRAVITY = 9.81  # m/s^2
 REACH = 0.2  # m along x; beyond it the hand need not follow the puck
 
@@ -32,10 +34,15 @@ class PandaSlide(PandaObject):
         material = Material(PUCK_FRICTION**2 / FRICTION, restitution=0.0)  # a pair's: the root
         return [
             Body(
-                Cylinder(RADIUS, HALF_HEIGHT), mass=1.0, position=(0.0, 0.0, HALF_HEIGHT),
-                material=material, name="puck",
+                Cylinder(RADIUS, HALF_HEIGHT), mass=MASS, position=(0.0, 0.0, HALF_HEIGHT),
+                material=material, name="puck", group=OBJECT, mask=OBJECT | HAND,
             )
         ]  # fmt: skip
+
+    def act(self, world: World, now: Readout, actions: Array) -> None:
+        """Moves the hand by up to 5 cm along each axis; the puck's speed is damped."""
+        super().act(world, now, actions)
+        world.apply_wrench(-DAMPING * MASS * now.linear_velocity[:, 0], body="puck")
 
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array

@@ -7,17 +7,20 @@ import numpy as np
 
 from physics import Body, Readout, World
 from physics.compiler.jit import stage
+from physics.scene.validation import number
 from rigid_envs.tasks.goals import Measure
+from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.twins.near_grasps import NEAR_GRASP_DRAWS, start_near_grasps
+from rigid_envs.twins.grasping_twin import GraspingTwin
 from rigid_envs.twins.panda.hand import OpenHand
-from rigid_envs.twins.panda.task import HALF, LIMIT, RANGE, PandaTask, behind, cube, observed
-from rigid_envs.twins.twin import GraspingTwin, along_axes, components
+from rigid_envs.twins.panda.task import HALF, LIMIT, RANGE, PandaTask, cube, observed
+from rigid_envs.twins.twin import along_axes, components
 
 Array = np.ndarray
 
 CUBES = ("first cube", "second cube")
-PLACED = 0.05  # m, of the first cube from its goal, for the second one's turn
+PLACED = 0.04  # m, of the first cube from its goal, for the second one's turn
+JITTER = 0.03  # m, largest offset along x and y of a first cube that starts at its goal
 HEIGHTS = (HALF, 3.0 * HALF)  # m, of the cubes at their starts and goals
 
 
@@ -36,17 +39,37 @@ class PandaStack(PandaTask, GraspingTwin):
 
     So two cubes side by side at the goal also count, as in the original. The second cube starts
     4 cm above the table, on the first one where they overlap.
+
+    Args:
+        shaped: see `Twin`.
+        near_grasp_start_prob: probability that an episode begins with the open hand around or just
+            above the next cube; for training.
+        partial_tower_start_prob: probability that the first cube starts at its goal, and the second
+            one on the table; for training.
     """
 
     original = "PandaStack-v3"
     max_episode_steps = 100
     threshold = 0.1
     hand: ClassVar[OpenHand] = OpenHand()
+    half = HALF
     actions = OpenHand.actions
     bounds = observed(hand, *CUBES)
     goal_bounds = components(LIMIT, *along_axes(*CUBES))
-    draw_count = 6 + NEAR_GRASP_DRAWS
-    shaping = {"placed": 4.0, "next": 10.0, "reach": 3.0, "time": -4.0}
+    draw_count = 6 + 3 + NEAR_GRASP_DRAWS
+    shaping = {"placed": 4.0, "next": 10.0, "reach": 5.0, "grasp": 1.0, "time": -6.0}
+
+    def __init__(
+        self,
+        shaped: bool = False,
+        near_grasp_start_prob: float = 0.0,
+        partial_tower_start_prob: float = 0.0,
+    ) -> None:
+        """Checks the probabilities."""
+        super().__init__(shaped, near_grasp_start_prob)
+        self.partial_tower_start_prob = number(
+            "partial_tower_start_prob", partial_tower_start_prob, low=0.0, high=1.0
+        )
 
     def measure(self) -> Measure:
         """The distance of both goals as one point."""
@@ -61,12 +84,14 @@ class PandaStack(PandaTask, GraspingTwin):
         places = RANGE * (2.0 * draws[:, :6].reshape(-1, 3, 2) - 1.0)
         position, goals = np.zeros((2, len(draws), 2, 3))
         position[:, :, :2], position[:, :, 2] = places[:, :2], HEIGHTS
+        goals[:, :, :2], goals[:, :, 2] = places[:, 2:], HEIGHTS
+        partial = draws[:, 6] < self.partial_tower_start_prob
+        position[partial, 0, :2] = goals[partial, 0, :2] + JITTER * (2.0 * draws[partial, 7:9] - 1)
+        beside = np.abs(position[:, 1, :2] - position[:, 0, :2]).max(axis=1) > 2.0 * HALF
+        position[partial & beside, 1, 2] = HALF
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
-        start_near_grasps(
-            world, mask, draws[:, 6:], self.near_grasp_start_prob, self.hand.pads, HALF
-        )
-        goals[:, :, :2], goals[:, :, 2] = places[:, 2:], HEIGHTS
+        self.start_near_grasps(world, mask, draws[:, 9:], partial.astype(int))
         return goals.reshape(-1, 6)
 
     def achieved(self, world: World, now: Readout) -> Array:
@@ -76,17 +101,17 @@ class PandaStack(PandaTask, GraspingTwin):
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """Terms of the next cube: the second one where the first is within 5 cm of its goal.
+        """Terms of the next cube: the second one where the first is within 4 cm of its goal.
 
-        `placed`: 1 where it is the second. `next`: minus its distance from its goal, m.
-
-        `reach`: minus the distance in m from the hand to the point behind it.
+        `placed`: 1 where it is the second. `next`: minus its distance from its goal, m. And those
+        of grasping it.
         """
         cubes, goals = achieved.reshape(-1, 2, 3), desired.reshape(-1, 2, 3)
         lacking = distance(cubes, goals)
         placed = lacking[:, 0] < PLACED
         next_one = np.arange(len(cubes)), placed.astype(int)
-        cube, goal = cubes[next_one], goals[next_one]
-        goal[:, 2] = cube[:, 2]  # cubes are pushed
-        reach = distance(self.hand.position(now), behind(cube, goal))
-        return {"placed": placed.astype(float), "next": -lacking[next_one], "reach": -reach}
+        return {
+            "placed": placed.astype(float),
+            "next": -lacking[next_one],
+            **self.grasp_terms(now, cubes[next_one]),
+        }

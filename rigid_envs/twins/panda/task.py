@@ -8,7 +8,7 @@ from physics import Body, Box, Ground, Material, Readout, Scene, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
-from rigid_envs.twins.panda.hand import ClosedHand, OpenHand
+from rigid_envs.twins.panda.hand import HAND, OBJECT, UNDER_HAND, ClosedHand, OpenHand
 from rigid_envs.twins.twin import Twin, along_axes, components
 
 Array = np.ndarray
@@ -36,9 +36,10 @@ class PandaTask(Twin):
         return []
 
     def scene(self) -> Scene:
-        """The table, what lies on it, and the hand."""
-        table = Ground(Material(FRICTION, restitution=0.0), name="table")
-        return Scene(bodies=self.bodies(), statics=[table], drives=[self.hand.drive()])
+        """The table, what lies on it, and the hand, which slides on it without friction."""
+        table = Ground(Material(FRICTION, 0.0), 0.0, "table", OBJECT, OBJECT)
+        under_hand = Ground(Material(0.0, 0.0), 0.0, "table under the hand", UNDER_HAND, HAND)
+        return Scene(bodies=self.bodies(), statics=[table, under_hand], drives=[self.hand.drive()])
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis, as far as the arm gets."""
@@ -98,8 +99,9 @@ def cube(name: str, mass: float, height: float) -> Body:
     """A cube of `mass` kg whose centre is `height` m above the table."""
     material = Material(FRICTION, restitution=0.0)
     return Body(
-        Box((HALF,) * 3), mass=mass, position=(0.0, 0.0, height), material=material, name=name
-    )
+        Box((HALF,) * 3), mass=mass, position=(0.0, 0.0, height), material=material, name=name,
+        group=OBJECT, mask=OBJECT | HAND,
+    )  # fmt: skip
 
 
 def observed(hand: ClosedHand | OpenHand, *bodies: str) -> Bounds:

@@ -5,7 +5,7 @@ import pytest
 
 from physics import PRESETS as FIDELITIES
 from rigid_envs import RigidEnv, Runner
-from rigid_envs.tasks import hand
+from rigid_envs.tasks.grasping import hand
 from rigid_envs.tasks.throw import (
     GRAVITY,
     MAX_TARGET_ANGLE,

@@ -8,7 +8,10 @@ from benchmarks.twins.recordings import Recording
 from benchmarks.twins.replay import OBJECT, body_errors, hand_errors, replay
 from physics import Box, Drive, Scene, World
 from rigid_envs.twins import TWINS
-from rigid_envs.twins.fetch.slide import CREEPING, SLIDING, braking, stopping_point
+from rigid_envs.twins.fetch.hand import CREEPING as HAND_CREEPING
+from rigid_envs.twins.fetch.hand import RESTING, braked
+from rigid_envs.twins.fetch.hand import SLIDING as HAND_SLIDING
+from rigid_envs.twins.fetch.slide import CREEPING, GLIDING, SLIDING, braking, predicted
 from rigid_envs.twins.fetch.task import rotation as fetch_rotation
 from rigid_envs.twins.panda.task import rotation as panda_rotation
 from rigid_envs.twins.servo import Servo
@@ -16,7 +19,7 @@ from rigid_envs.twins.servo import Servo
 
 @pytest.mark.parametrize(
     ("name", "twin", "median"),
-    [("fetch-axes", "fetch_reach", 2e-3), ("fetch-motions", "fetch_reach", 3e-3),
+    [("fetch-axes", "fetch_reach", 2.5e-3), ("fetch-motions", "fetch_reach", 1.6e-3),
      ("panda-axes", "panda_reach", 8e-3), ("panda-motions", "panda_reach", 12e-3)],
 )  # fmt: skip
 def test_the_hand_is_where_the_original_is_after_twelve_steps(name, twin, median):
@@ -24,6 +27,44 @@ def test_the_hand_is_where_the_original_is_after_twelve_steps(name, twin, median
     errors = hand_errors(recording, replay(recording, TWINS[twin]()))
     moved = np.linalg.norm(np.diff(recording.observations[[0, 12], :, :3], axis=0), axis=2)
     assert np.median(errors) < median < 0.2 * np.median(moved)
+
+
+def test_the_table_brakes_a_hand_that_presses_on_it():
+    recording = Recording.load("fetch-presses")
+    found = replay(recording, TWINS["fetch_reach"]())
+    moved, there = (
+        np.diff(path[-2:, :, 1], axis=0)[0] for path in (found.hand, recording.observations)
+    )
+    assert np.abs(moved / there - 1.0).max() < 0.15
+    # of 4, 8, 20 and 40 mm that are asked for, most is lost where the hand presses hard
+    assert there.reshape(4, 5)[0, -1] < 0.5 * there.reshape(4, 5)[0, 0]
+
+
+def test_a_hand_slides_as_coulomb_says_and_creeps():
+    free = np.array([[0.03, 0.0, -1e-4], [0.0, 1e-4, -0.02], [0.03, 0.0, 0.01], [0.02, 0.0, -0.02]])
+    lost = (1.0 - braked(np.full(4, RESTING), free)) * np.linalg.norm(free[:, :2], axis=1)
+    assert lost[0] == pytest.approx(HAND_SLIDING * 1e-4, rel=1e-3)
+    assert lost[1] == pytest.approx(HAND_CREEPING * 1e-4, rel=1e-3)
+    assert lost[2] == pytest.approx(0.0, abs=1e-8)  # it rises
+    # a hand 2 cm above the table presses by nothing, one 1 cm above it by half as much
+    kept = braked(np.array([RESTING + 0.02, RESTING + 0.01]), free[[3, 3]])
+    assert kept[0] == pytest.approx(1.0, abs=1e-6)
+    assert kept[1] < 0.8
+
+
+def test_a_stretched_arm_gets_no_farther():
+    world = World(TWINS["fetch_slide"]().scene(), "balanced", 1)
+    twin, actions = TWINS["fetch_slide"](), np.array([[1.0, 0.0, 0.3, 0.0]])
+    reached = []
+    for _ in range(40):
+        now = world.read()
+        twin.act(world, now, actions)
+        world.advance(twin.frame)
+        reached.append(twin.hand.position(world.read())[0, 0])
+    steps = np.diff(reached)
+    assert steps[:4].min() > 0.02  # as the original: 0.026 m in the fourth step, then less and less
+    assert steps[30:].max() < 0.005
+    assert reached[-1] == pytest.approx(1.42, abs=0.1)  # the original: 1.42 m
 
 
 def test_fetch_pushes_a_cube_to_where_the_original_does():
@@ -44,7 +85,7 @@ def test_a_servo_of_the_engine_follows_the_formula(frequency, damping):
     velocity = np.array([[0.2, 0.1, -0.4]])
     world.set_state(drive_velocity=velocity[:, None])
     substep = world.fidelity.substep
-    ahead, speed = servo.moving(time, substep, moved, velocity, end)
+    ahead, speed = servo.moving(time, substep, velocity, moved, end)
     world.move_drives(ahead[:, None], 0.0)
     world.move_drives((ahead + time * speed)[:, None], time)
     world.advance(time)
@@ -66,10 +107,15 @@ def test_friction_of_the_puck_is_that_of_a_pyramid():
     assert np.abs(found).sum(axis=1) == pytest.approx(np.full(4, SLIDING))
     assert found[2] == pytest.approx([-0.5 * SLIDING, -0.5 * SLIDING])
     assert found[3] == pytest.approx([-SLIDING, 0.0])  # the faster component first
-    # along an axis: v^2 / 2a down to the speed from which it creeps on
-    v, a, k = 1.0, SLIDING, CREEPING
-    far = (v * v - (a / k) ** 2) / (2.0 * a) + a / k**2
-    assert stopping_point(np.zeros((1, 2)), np.array([[v, 0.0]]))[0] == pytest.approx(
+    slow = np.array([[GLIDING, 0.0], [0.0, 0.5 * GLIDING], [0.0, 0.0]])
+    assert braking(slow) == pytest.approx(np.zeros((3, 2)))  # it glides on, or rests
+    # along an axis: with the largest deceleration to the speed c from which it creeps, v' = -k (v -
+    # g), and at last it glides; 1.2 s in all
+    v, a, k, g = 1.0, SLIDING, CREEPING, GLIDING
+    c = g + a / k
+    left = 1.2 - (v - c) / a
+    far = (v * v - c * c) / (2.0 * a) + g * left + (c - g) / k * (1.0 - np.exp(-k * left))
+    assert predicted(np.zeros((1, 2)), np.array([[v, 0.0]]))[0] == pytest.approx(
         [far, 0.0], rel=0.05
     )
 

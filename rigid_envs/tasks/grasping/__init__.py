@@ -1,0 +1,1 @@
+"""A parallel gripper, grasps, and the tasks in which it carries one object."""
