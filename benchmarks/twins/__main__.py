@@ -1,9 +1,9 @@
-"""python -m benchmarks.twins record | identify | compare."""
+"""python -m benchmarks.twins record | identify | compare | speed."""
 
 import argparse
 from pathlib import Path
 
-from benchmarks.twins import identify, recordings, replay
+from benchmarks.twins import identify, recordings, replay, speed
 from rigid_envs.twins import TWINS
 
 
@@ -11,10 +11,10 @@ def main() -> None:
     """Runs one of the commands."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.twins", description=__doc__)
     parser.add_argument(
-        "command", choices=("record", "identify", "compare"),
+        "command", choices=("record", "identify", "compare", "speed"),
         help="record: play scripts in the originals, and write what happened to data/; identify: "
         "print what twins take from it, and train the arms; compare: print how far twins "
-        "differ from what was recorded",
+        "differ from what was recorded; speed: steps per second beside the originals (3 min)",
     )  # fmt: skip
     parser.add_argument("--python", type=Path, help="interpreter that has the originals")
     parser.add_argument(
@@ -40,6 +40,9 @@ def main() -> None:
         if options.arms:
             for name, robot in identify.ROBOTS.items():
                 print(f"{name} arm: {identify.arm(robot, options.python)}")
+    elif options.command == "speed":
+        for row in speed.table(options.python):
+            print(row, flush=True)
     else:
         print("\n".join(replay.summary()))
 

@@ -69,8 +69,8 @@ def test_a_stretched_arm_gets_no_farther():
 
 def test_fetch_pushes_a_cube_to_where_the_original_does():
     recording = Recording.load("fetch-pushes")
-    errors = body_errors(recording, replay(recording, TWINS["fetch_push"]()), OBJECT["fetch"])
-    assert np.median(errors) < 0.02
+    found = replay(recording, TWINS["fetch_push"](), "accurate")
+    assert np.median(body_errors(recording, found, OBJECT["fetch"])) < 0.01
 
 
 @pytest.mark.parametrize(("frequency", "damping"), [(54.0, 1.12), (50.0, 1.0), (17.0, 0.28)])

@@ -30,15 +30,15 @@ def test_all_tasks_at_all_presets_by_default(monkeypatch):
     monkeypatch.setattr(compiling, "compile_general", done.append)
     monkeypatch.setattr(compiling, "_compile_environment", lambda *job: done.append(job))
     main(["compile", "--general-only"])
-    assert len(done) == len(GENERAL_KERNELS) + 6
+    assert len(done) == len(GENERAL_KERNELS) + 7
     main(["compile"])
-    assert len(done) == 2 * (len(GENERAL_KERNELS) + 6) + 6 * 4
+    assert len(done) == 2 * (len(GENERAL_KERNELS) + 7) + 7 * 4
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["Push-v0"], "unknown environment 'Push-v0': choose from RigidEnvs/Push-v0"),
+        (["Push-v0"], "unknown environment 'Push-v0': choose from RigidEnvs/PickAndPlace-v0"),
         (["--fidelity", "best"], "unknown fidelity 'best': choose from fast, balanced"),
         (["--level", "sse"], "--level sse: choose from x86-64-v3, x86-64-v4"),
     ],

@@ -105,7 +105,7 @@ def test_file_acts_as_a_bounded_policy(quick_ppo, tmp_path):
     network = {"net_arch": [16, 8], "min_std": 0.1}
     config = quick_ppo.replace(policy=BOUNDED_POLICY, policy_kwargs=network, learning_rate=0.05)
     folder = train(config, tmp_path, quiet=True).folder
-    expected = trained_policy(folder.model, trust_pickle=True)
+    expected = trained_policy(str(folder.model), trust_pickle=True)
     for scale in (0.3, 3.0):
         action = read_policy(folder.policy).act(observations(scale=scale))
         np.testing.assert_allclose(action, expected.act(observations(scale=scale)), atol=1e-6)
