@@ -22,7 +22,7 @@ def test_half_of_the_goals_lie_in_the_air_and_none_is_met_at_the_start():
     assert not info["is_success"].any()
     goal = observation["desired_goal"].astype(float)
     in_air = goal[:, 2] > HALF + 1e-6
-    assert in_air.mean() == pytest.approx(0.45, abs=0.03)  # a tenth of those in the air is too low
+    assert in_air.mean() == pytest.approx(0.45, abs=0.03)  # a tenth of heights are too low
     assert goal[:, 2].min() == pytest.approx(HALF)
     assert goal[:, 2].max() == pytest.approx(HIGHEST, abs=0.002)
     assert np.abs(goal[:, :2]).max() == pytest.approx(RANGE, abs=0.002)
