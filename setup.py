@@ -27,8 +27,6 @@ setup(
     package_data={
         "": ["py.typed"],
         "physics": ["prebuilt/*"],
-        "rigid_envs.twins.fetch": ["arm.npz"],
-        "rigid_envs.twins.panda": ["arm.npz"],
         "training.configs": ["*.yaml"],
         "training.shipped": ["ppo/*_seed0/policy.safetensors"],
     },

@@ -1,5 +1,7 @@
 """Snapshots: the complete state of worlds, saved and restored."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +13,8 @@ from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
 from physics.scene.scene import Scene
 from physics.step.simulation import Simulation
+
+Array = np.ndarray
 
 
 class Snapshot(NamedTuple):
@@ -26,6 +30,7 @@ class Snapshot(NamedTuple):
     features: Features
     parameters: Parameters | None = None  # of worlds with per-world parameters
     hidden: Any = None  # of worlds of many bodies: their pairs
+    memory: Mapping[str, Array] = MappingProxyType({})  # see `World.memory`
 
 
 def save(simulation: Simulation) -> Snapshot:

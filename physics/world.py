@@ -113,6 +113,7 @@ class World(Readings):
                 warn_of_soft_supports(scene, self.fidelity, self._simulation.base)
         if not allow_unstable:
             warn_of_odd_scenes(scene, self.fidelity)
+        self._memory: dict[str, Array] = {}
         self._limits = ParameterLimits(scene, self.fidelity)
         self._solids = Solids(scene.solid_names, self._queries.can_touch)
 
@@ -158,8 +159,14 @@ class World(Readings):
         return mask
 
     def reset(self, worlds: Any = None) -> None:
-        """Resets worlds to the scene's state at time zero; all of them, or a mask [count]."""
-        self._simulation.reset(self._mask(worlds))
+        """Resets worlds to the scene's state at time zero; all of them, or a mask [count].
+
+        Their `memory` is zero again; parameters stay.
+        """
+        mask = self._mask(worlds)
+        self._simulation.reset(mask)
+        for numbers in self._memory.values():
+            numbers[mask] = 0.0
 
     def set_state(
         self,
@@ -218,7 +225,7 @@ class World(Readings):
         make_velocity_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked))
         simulation.changed()
 
-    def move_drives(self, target: Any, time: float) -> None:
+    def move_drives(self, target: Any, time: float, *, renew_forces: bool = False) -> None:
         """Moves the set point of every drive from where it is to a target, and holds it there.
 
         A loaded drive lags behind its set point. Because the motion starts at the set point, the
@@ -228,6 +235,9 @@ class World(Readings):
             target: [count, drives, 3] m, or what broadcasts to it.
             time: s, duration of the motion. With 0 the set points are there at once, and the servos
                 answer a step.
+            renew_forces: compute forces anew, so that servos follow the command from now on. Else
+                the first half of the next substep is still under the forces of the last one, as
+                integrators keep them.
 
         Raises:
             TypeError, ValueError: a wrong shape, a value that isn't finite, a negative time, or a
@@ -237,6 +247,8 @@ class World(Readings):
         time = number("time", time, low=0.0)
         simulation = self._simulation
         make_move_command()(simulation.state.dynamic, simulation.bodies, worlds_last(checked), time)
+        if instance("renew_forces", renew_forces, bool):
+            simulation.renew_forces()
         simulation.changed(poses=time == 0.0)
 
     def _drives_shape(self, method: str) -> tuple[int, int, int]:
@@ -371,11 +383,32 @@ class World(Readings):
             self._limits.check(new, chosen)
         self._simulation.change_parameters(mask, new)
 
+    def memory(self, name: str, size: int) -> Array:
+        """Numbers that each world keeps for its user: zero at first, and after `reset`.
+
+        They mean nothing to the engine, but belong to the state: snapshots include them.
+
+        Args:
+            name: of these numbers.
+            size: how many each world keeps.
+
+        Returns:
+            [count, size], to write to.
+
+        Raises:
+            ValueError: this name has numbers of another size.
+        """
+        found = self._memory.setdefault(name, np.zeros((self.count, size)))
+        if found.shape[1] != size:
+            raise ValueError(f"size of memory {name!r} must be {found.shape[1]}, got {size}")
+        return found
+
     # --- saving -------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
         """The complete state; worlds continue bitwise identically after `restore`."""
-        return snapshot.save(self._simulation)
+        memory = {name: numbers.copy() for name, numbers in self._memory.items()}
+        return snapshot.save(self._simulation)._replace(memory=memory)
 
     def restore(self, saved: Snapshot) -> None:
         """Returns all worlds to a snapshot of a World of the same scene, fidelity and count.
@@ -387,3 +420,7 @@ class World(Readings):
         instance("saved", saved, Snapshot)
         limits = None if self._allow_unstable else self._limits
         snapshot.restore(self._simulation, saved, limits)
+        for name, numbers in saved.memory.items():
+            self.memory(name, numbers.shape[1])[:] = numbers
+        for name in self._memory.keys() - saved.memory.keys():
+            self._memory[name][:] = 0.0

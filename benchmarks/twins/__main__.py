@@ -13,13 +13,10 @@ def main() -> None:
     parser.add_argument(
         "command", choices=("record", "identify", "compare", "speed"),
         help="record: play scripts in the originals, and write what happened to data/; identify: "
-        "print what twins take from it, and train the arms; compare: print how far twins "
+        "print what twins take from it; compare: print how far twins "
         "differ from what was recorded; speed: steps per second beside the originals (3 min)",
     )  # fmt: skip
     parser.add_argument("--python", type=Path, help="interpreter that has the originals")
-    parser.add_argument(
-        "--arms", action="store_true", help="identify: the arms, too (15 min, 14 GB of memory)"
-    )
     options = parser.parse_args()
     if options.command == "record":
         for name, kind in recordings.KINDS.items():
@@ -37,9 +34,6 @@ def main() -> None:
         sliding, creeping, gliding = identify.braking(slides)
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
               f"gliding {gliding:.3f} m/s")  # fmt: skip
-        if options.arms:
-            for name, robot in identify.ROBOTS.items():
-                print(f"{name} arm: {identify.arm(robot, options.python)}")
     elif options.command == "speed":
         for row in speed.table(options.python):
             print(row, flush=True)

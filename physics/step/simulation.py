@@ -224,6 +224,10 @@ class Simulation:
         self.state.wrench[pushed] = 0.0
         self._new_forces(pushed)
 
+    def renew_forces(self) -> None:
+        """Marks the forces of all worlds as out of date; contacts keep their memory."""
+        self._new_forces(self.everyone)
+
     def _new_forces(self, worlds: Array) -> None:
         """Marks the forces of the worlds of a mask as out of date; contacts keep their memory."""
         marks = self.state.world["needs_refresh"]

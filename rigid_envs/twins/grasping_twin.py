@@ -39,9 +39,11 @@ class GraspingTwin(Twin):
         self, world: World, mask: Array, draws: Array, body: Array | int = 0
     ) -> None:
         """Moves the hand around a body in some worlds, see the function of this name."""
-        start_near_grasps(
+        chosen, position = start_near_grasps(
             world, mask, draws, self.near_grasp_start_prob, self.hand.pads, self.half, body
         )
+        if len(position):
+            self.hand.place(world, chosen, position)
 
     def grasp_terms(self, now: Readout, position: Array) -> dict[str, Array]:
         """Terms of the object at `position` [count, 3] m, see the function of this name."""

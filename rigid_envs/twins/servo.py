@@ -107,4 +107,4 @@ def _substeps(
 def move_set_points(world: World, start: Array, speed: Array, time: float) -> None:
     """Moves the set points of all drives from `start` [n, drives, 3] m at a speed [n, 3] m/s."""
     world.move_drives(start, 0.0)
-    world.move_drives(start + time * speed[:, None], time)
+    world.move_drives(start + time * speed[:, None], time, renew_forces=True)

@@ -702,3 +702,48 @@ def test_a_command_that_is_broadcast_has_the_type_of_any_other():
     assert not one.flags.writeable
     assert worlds_last(one).flags.writeable
     assert worlds_last(np.zeros((4, 2, 3))).flags.c_contiguous
+
+
+def test_memory_belongs_to_the_state():
+    world = World(Scene([Body(Sphere(0.1), mass=1.0)]), count=3)
+    kept = world.memory("mine", 2)
+    assert kept.shape == (3, 2)
+    assert not kept.any()
+    kept[:] = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
+    saved = world.snapshot()
+    world.memory("later", 1)[:] = 7.0
+    world.reset(np.array([False, True, False]))
+    assert kept.tolist() == [[1.0, 2.0], [0.0, 0.0], [5.0, 6.0]]
+    world.restore(saved)
+    assert kept.tolist() == [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
+    assert not world.memory("later", 1).any()
+    other = World(Scene([Body(Sphere(0.1), mass=1.0)]), count=3)
+    other.restore(saved)
+    assert other.memory("mine", 2).tolist() == kept.tolist()
+    with pytest.raises(ValueError, match="size of memory 'mine' must be 2, got 3"):
+        world.memory("mine", 3)
+
+
+def test_drives_follow_a_command_from_the_next_instant_on():
+    """With forces computed anew, a motion follows from its start and command, not from its past."""
+    drive = Drive(Box((0.01,) * 3), mass=1.0, force_limit=1e6, frequency=50.0, damping_ratio=1.0)
+
+    def start(far, time):
+        """A drive that moves after a command, of which its velocity is a multiple."""
+        world = World(Scene(bodies=[], drives=[drive]), count=1)
+        world.move_drives([far, 0.0, 0.0], time)
+        world.advance(0.04)
+        return world
+
+    jump, glide = start(0.01, 0.0), start(0.01, 0.05)
+    slower = jump.drive_velocity[0, 0, 0] / glide.drive_velocity[0, 0, 0]
+    for renew in (False, True):
+        moved = []
+        for world in (start(0.01, 0.0), start(0.01 * slower, 0.05)):
+            position = world.drive_position.copy()
+            world.move_drives(position, 0.0, renew_forces=renew)
+            world.advance(0.04)
+            moved.append((world.drive_position - position)[0, 0, 0])
+        assert (abs(moved[1] / moved[0] - 1.0) < 1e-9) == renew
+    with pytest.raises(TypeError, match="renew_forces"):
+        world.move_drives([0.0, 0.0, 0.0], 0.0, renew_forces=1)

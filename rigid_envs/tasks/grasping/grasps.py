@@ -29,7 +29,7 @@ def start_near_grasps(
     pads: Callable[[Array, Array], Array],
     half: float,
     body: Array | int = 0,
-) -> None:
+) -> tuple[Array, Array]:
     """Moves the open hand around a body, or just above it, in some worlds that were just reset.
 
     Args:
@@ -41,15 +41,19 @@ def start_near_grasps(
             is open, [k] m.
         half: m, half the width of the body.
         body: [n] its index.
+
+    Returns:
+        Which worlds' hands were moved, [count] bool, and to where, [k, 3] m.
     """
     near = draws[:, 0] < probability
-    if not near.any():
-        return
     chosen = mask.copy()
     chosen[mask] = near
+    if not near.any():
+        return chosen, np.zeros((0, 3))
     middle = world.position[np.flatnonzero(chosen), np.broadcast_to(body, len(draws))[near]]
     middle = middle + _RANGE * (draws[near, 1:4] - (0.5, 0.5, 0.0))
     world.set_state(drive_position=pads(middle, half + _GAP * draws[near, 4]), worlds=chosen)
+    return chosen, middle
 
 
 def grasp_terms(

@@ -10,22 +10,21 @@ forward, y left, z up.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from physics import Box, Drive, Gripper, Material, Readout, World
-from rigid_envs.twins.arm import Arm
+from rigid_envs.twins.arms.arm import Arm
 from rigid_envs.twins.servo import Servo, move_set_points
 
 Array = np.ndarray
 Vector = tuple[float, float, float]
 
+STRIDE = 0.05  # m, displacement along each axis that an action asks for
+
 # identified
-ARM = Arm(Path(__file__).with_name("arm.npz"), centre=(1.02, 0.75, 0.57), extent=0.15, stride=0.05)
 SERVO = Servo(55.8, 1.09)
-BASE = 0.405  # m along x, of the robot's base in most tasks
 RESTING = 0.4195  # m, height of a hand that rests on the table
 # of a hand that presses on the table: loss of displacement along the table per lack of displacement
 # downwards where it slides, and the part that is lost where it creeps
@@ -56,16 +55,19 @@ class ClosedHand:
     """The closed fingers, one box.
 
     Args:
-        start: position of the grip site at the start of an episode, m.
-        base: m along x, of the robot's base.
+        arm: what carries it.
     """
 
-    start: Vector
-    base: float = BASE
+    arm: Arm
 
     # kg, chosen, not measured. By the model's inverse weight and impedance the original's hand
     # weighs some 400 kg to what it meets; a lighter one squashes an object less that is in the way
     MASS: ClassVar[float] = 40.0
+
+    @property
+    def start(self) -> Array:
+        """Position [3] m of the grip site at the start of an episode."""
+        return self.arm.start_pose[0]
 
     def drive(self) -> Drive:
         """The drive of a scene."""
@@ -100,18 +102,21 @@ class OpenHand:
     """Two fingers that open and close; both always do the same.
 
     Args:
-        start: position of the grip site at the start of an episode, m.
-        base: m along x, of the robot's base.
+        arm: what carries it.
     """
 
-    start: Vector
-    base: float = BASE
+    arm: Arm
 
     # kg, chosen: light enough that the limited grip still closes the fingers in a few steps
     MASS: ClassVar[float] = 10.0
     # N of each finger, chosen. The original's spring presses with up to 720 N, which would squash
     # the object here
     GRIP: ClassVar[float] = 150.0
+
+    @property
+    def start(self) -> Array:
+        """Position [3] m of the grip site at the start of an episode."""
+        return self.arm.start_pose[0]
 
     def drive(self) -> Gripper:
         """The gripper of a scene."""
@@ -133,6 +138,10 @@ class OpenHand:
         opening = opening + SERVO.ahead(frame, world.fidelity.substep, moved, velocity)
         ahead, speed = _follow(self, world, now, actions, frame)
         move_set_points(world, self.pads(self.position(now) + ahead, opening), speed, frame)
+
+    def place(self, world: World, worlds: Array, position: Array) -> None:
+        """Tells the arm that hands were moved, see `Arm.place`."""
+        self.arm.place(world, worlds, position)
 
     def pads(self, position: Array, opening: Array) -> Array:
         """Positions [n, 2, 3] m of the fingers of hands at [n, 3] m, each [n] m open."""
@@ -171,9 +180,7 @@ def _follow(
         How far ahead of the hand it starts, [n, 3] m, and its velocity, [n, 3] m/s.
     """
     position, velocity = hand.position(now), hand.velocity(now).astype(float)
-    moved, end = ARM.answer(
-        position - (hand.base, 0.0, 0.0), velocity, ARM.stride * actions[:, :3], frame
-    )
+    moved, end, _ = hand.arm.respond(world, position, velocity, STRIDE * actions[:, :3], frame)
     kept = braked(position[:, 2], moved)[:, None]
     moved[:, :2] *= kept
     end[:, :2] *= kept

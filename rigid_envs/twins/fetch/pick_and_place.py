@@ -6,6 +6,7 @@ import numpy as np
 
 from physics import Body, Readout, World
 from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
+from rigid_envs.twins.fetch.arm import HIGH
 from rigid_envs.twins.fetch.hand import OpenHand
 from rigid_envs.twins.fetch.push import HALF, cube
 from rigid_envs.twins.fetch.task import FetchObject
@@ -20,7 +21,7 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
     """Half of the goals lie up to 45 cm above the table; solved within 5 cm of the goal."""
 
     original = "FetchPickAndPlace-v4"
-    hand: ClassVar[OpenHand] = OpenHand((1.341935, 0.749101, 0.534725))
+    hand: ClassVar[OpenHand] = OpenHand(HIGH)
     half = HALF
     draw_count = FetchObject.draw_count + NEAR_GRASP_DRAWS
     shaping = {"success": 1.0, "distance": 10.0, "reach": 5.0, "grasp": 1.0}

@@ -1,6 +1,7 @@
 """FetchPush: the closed fingers push a cube over the table."""
 
 from physics import Body, Box, Material
+from rigid_envs.twins.fetch.arm import LOW
 from rigid_envs.twins.fetch.hand import HAND, OBJECT, ClosedHand
 from rigid_envs.twins.fetch.task import TABLE, FetchObject
 
@@ -20,7 +21,7 @@ class FetchPush(FetchObject):
     """Cube and goal lie within 15 cm of the hand along x and y; solved within 5 cm of the goal."""
 
     original = "FetchPush-v4"
-    hand = ClosedHand((1.345516, 0.749026, 0.413617))
+    hand = ClosedHand(LOW)
 
     def object(self) -> Body:
         """The cube."""

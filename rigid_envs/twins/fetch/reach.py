@@ -3,6 +3,7 @@
 import numpy as np
 
 from physics import Readout, Scene, World
+from rigid_envs.twins.fetch.arm import REACHING
 from rigid_envs.twins.fetch.hand import ClosedHand
 from rigid_envs.twins.fetch.task import FINGERS, FetchTask
 from rigid_envs.twins.twin import along_axes, components
@@ -16,7 +17,7 @@ class FetchReach(FetchTask):
     """Goals lie within 15 cm of the hand's start along each axis; solved within 5 cm."""
 
     original = "FetchReach-v4"
-    hand = ClosedHand((1.341835, 0.749101, 0.534725))
+    hand = ClosedHand(REACHING)
     bounds = components(
         np.inf,
         *along_axes("hand"), *FINGERS,

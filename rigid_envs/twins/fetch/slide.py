@@ -10,6 +10,7 @@ import numpy as np
 
 from physics import Body, Cylinder, Material, Readout, World
 from rigid_envs.tasks.rewards import distance
+from rigid_envs.twins.fetch.arm import FAR
 from rigid_envs.twins.fetch.hand import HAND, OBJECT, ClosedHand
 from rigid_envs.twins.fetch.task import FetchObject
 
@@ -31,7 +32,7 @@ class FetchSlide(FetchObject):
     """The middle of the goals lies 40 cm ahead of the hand; solved within 5 cm of the goal."""
 
     original = "FetchSlide-v4"
-    hand = ClosedHand((0.992692, 0.749043, 0.412662), base=0.05)
+    hand = ClosedHand(FAR)
     start_range = 0.1
     goal_range = 0.3
     goal_offset = 0.4

@@ -1,63 +1,97 @@
 """The hand of the Panda robot.
 
-In the originals inverse kinematics turns a displacement of the hand into joint angles, and motors
-of limited torque drive the joints there: along y the hand moves 4 cm in a step, forward 2 cm, less
-where the arm is stretched, and it sinks meanwhile. Frames: x forward, y left, z up from the table's
-top.
+Its arm says how it moves, see `arm`: along y 4 cm in a step, forward 2 cm, less where the arm is
+stretched, and it sinks meanwhile. Frames: x forward, y left, z up from the table's top.
 """
 
-from pathlib import Path
+import math
 from typing import ClassVar
 
 import numpy as np
 
-from physics import Box, Drive, Gripper, Material, Readout, World
-from rigid_envs.twins.arm import Arm
+from physics import Box, Compound, Drive, Gripper, Material, Part, Readout, World
+from rigid_envs.twins.panda.arm import ARM
 from rigid_envs.twins.servo import Servo, move_set_points
 
 Array = np.ndarray
+Solids = tuple[tuple[float, float], ...]
+"""Half the width and half the height of each body, m."""
 
-ARM = Arm(Path(__file__).with_name("arm.npz"), centre=(0.0, 0.0, 0.15), extent=0.15, stride=0.05)
-START = np.array([0.038440, 0.0, 0.197400])  # m, of the end effector
-# chosen: slow enough that the hand doesn't jerk within a step, which threw cubes out of the grip
-SERVO = Servo(50.0, 1.0)
-MASS = 10.0  # kg
-FORCE = 1e4  # N
-# groups: objects, the hand, and the table that only the hand touches
-OBJECT, HAND, UNDER_HAND = 1, 2, 4
+STRIDE = 0.05  # m, displacement along each axis that an action asks for
+# groups: objects, and the hand; the table stops the hand by its arm
+OBJECT, HAND = 1, 2
+MASS = 10.0  # kg, chosen: a few times what the arm's inertia is worth at the hand
+# half the size along x and y of the tips of closed fingers, which may come to stand on an object
+TIP_DEPTH, TIP_WIDTH = 0.0088, 0.0144  # m
 
-# of the fingers' mesh, its lower part. It narrows towards the tip, from 26 to 14 mm along y; these
-# are the dimensions 27 mm above the tip, where a hand at an object's height meets its upper edge
-LENGTH, TIP = 0.05, 0.0038  # m; the tip is that much below the end effector, where it presses
-HALF_DEPTH, THICKNESS = 0.0102, 0.022  # m, of a finger along x and y
-_OFFSET = np.array([0.0, 0.0, 0.5 * LENGTH - TIP])
+
+def _closed_fingers() -> tuple[Compound, float]:
+    """The closed fingers, and how far their middle is above the end effector, m.
+
+    Their mesh narrows towards the tip: along y from 25 mm at 27 mm above the end effector to 14 mm
+    at 7 mm below it. Two slanted boxes have these faces; a third one is above them.
+    """
+    (wide, high), (narrow, low), top = (0.0251, 0.027), (TIP_WIDTH, -0.007), 0.042
+    thick, depth = 0.006, 0.0097  # half of each, of a slanted box
+    slant = math.atan2(wide - narrow, high - low)
+    length = math.hypot(wide - narrow, high - low)
+    y = 0.5 * (wide + narrow) - thick * math.cos(slant)
+    z = 0.5 * (high + low) + thick * math.sin(slant)
+    above = Box((0.0105, wide, 0.5 * (top - high)))
+    side = Box((depth, thick, 0.5 * length))
+    middle = (2.0 * side.volume * z + above.volume * 0.5 * (top + high)) / (
+        2.0 * side.volume + above.volume
+    )
+    parts = [
+        Part(
+            side,
+            (0.0, s * y, z - middle),
+            (-s * math.sin(0.5 * slant), 0.0, 0.0, math.cos(0.5 * slant)),
+        )
+        for s in (1.0, -1.0)
+    ]
+    return Compound([*parts, Part(above, (0.0, 0.0, 0.5 * (top + high) - middle))]), middle
+
+
+FINGERS, _MIDDLE = _closed_fingers()
 
 
 class ClosedHand:
-    """The closed fingers, one box."""
+    """The closed fingers, one solid."""
 
     actions: ClassVar = ("hand x", "hand y", "hand z")
     names: ClassVar = ()
+    arm: ClassVar = ARM
+
+    OFFSET: ClassVar = np.array([0.0, 0.0, _MIDDLE])  # m, of the solid from the end effector
+    # chosen: nearly as fast as the motors, as far as short substeps follow
+    SERVO: ClassVar = Servo(100.0, 1.3)
+    FORCE: ClassVar[float] = 1e4  # N, chosen: the servo is never limited
 
     def drive(self) -> Drive:
         """The drive of a scene."""
         return Drive(
-            Box((HALF_DEPTH, THICKNESS, 0.5 * LENGTH)), mass=MASS, force_limit=FORCE,
-            position=tuple(START + _OFFSET), frequency=SERVO.frequency,
-            damping_ratio=SERVO.damping, material=Material(1.0, restitution=0.0), name="hand",
-            group=HAND, mask=OBJECT | UNDER_HAND,
+            FINGERS, mass=MASS, force_limit=self.FORCE,
+            position=tuple(ARM.start_pose[0] + self.OFFSET), frequency=self.SERVO.frequency,
+            damping_ratio=self.SERVO.damping, material=Material(1.0, restitution=0.0), name="hand",
+            group=HAND, mask=OBJECT,
         )  # fmt: skip
 
-    def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
-        """Moves the hand by actions [count, 3]."""
+    def act(self, world: World, now: Readout, actions: Array, frame: float, solids: Solids) -> None:
+        """Moves the hand by actions [count, 3], over bodies with these solids."""
         position, velocity = self.position(now), self.velocity(now)
-        free = ARM.answer(position, velocity, asked_displacement(position, actions), frame)
-        ahead, speed = SERVO.moving(frame, world.fidelity.substep, velocity, *free)
+        below = support(now, position[:, None], TIP_WIDTH, solids)
+        asked = asked_displacement(position, actions)
+        free = ARM.respond(world, position, velocity, asked, frame, below)
+        substep = world.fidelity.substep
+        ahead, speed = self.SERVO.moving(frame, substep, velocity, free.moved, free.end)
+        pressed = np.where(below > 0.0, free.load, 0.0)  # the engine has objects, but no table
+        ahead[:, 2] -= pressed / (MASS * self.SERVO.frequency**2)
         move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
 
     def position(self, now: Readout) -> Array:
         """Position [count, 3] m of the end effector."""
-        return now.position[:, -1] - _OFFSET
+        return now.position[:, -1] - self.OFFSET
 
     def velocity(self, now: Readout) -> Array:
         """Velocity [count, 3] m/s."""
@@ -73,10 +107,16 @@ class OpenHand:
 
     actions: ClassVar = (*ClosedHand.actions, "grip")
     names: ClassVar = ("width",)
+    arm: ClassVar = ARM
 
     WIDEST: ClassVar[float] = 0.04  # m, how far a finger opens
     OPENED: ClassVar[float] = 0.088  # m, how far a free finger moves in a step at full action
-    HALF: ClassVar[float] = 0.01  # m, half the thickness of a finger
+    # m, half the size of a finger along x, y and z, and its middle above the end effector
+    HALF_DEPTH, HALF, HALF_LENGTH, MIDDLE = 0.0105, 0.01, 0.025, 0.0167
+    OFFSET: ClassVar = np.array([0.0, 0.0, MIDDLE])
+    # chosen: slow enough that the hand doesn't jerk in a step, which threw cubes out of the grip
+    SERVO: ClassVar = Servo(50.0, 1.0)
+    FORCE: ClassVar[float] = 1e4  # N, chosen: it holds what the grip holds
     # N of each finger, chosen. The original's motors press with up to 170 N, which would squash the
     # object here
     GRIP: ClassVar[float] = 80.0
@@ -86,34 +126,43 @@ class OpenHand:
     def drive(self) -> Gripper:
         """The gripper of a scene."""
         return Gripper(
-            Box((HALF_DEPTH, self.HALF, 0.5 * LENGTH)), mass=0.5 * MASS, force_limit=FORCE,
-            grip_limit=self.GRIP, position=tuple(START + _OFFSET), distance=2.0 * self.HALF,
-            frequency=SERVO.frequency, damping_ratio=SERVO.damping,
+            Box((self.HALF_DEPTH, self.HALF, self.HALF_LENGTH)), mass=0.5 * MASS,
+            force_limit=self.FORCE, grip_limit=self.GRIP,
+            position=tuple(ARM.start_pose[0] + self.OFFSET), distance=2.0 * self.HALF,
+            frequency=self.SERVO.frequency, damping_ratio=self.SERVO.damping,
             material=Material(self.FRICTION, restitution=0.0), name="hand",
-            group=HAND, mask=OBJECT | UNDER_HAND,
+            group=HAND, mask=OBJECT,
         )  # fmt: skip
 
-    def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
+    def act(self, world: World, now: Readout, actions: Array, frame: float, solids: Solids) -> None:
         """Moves the hand and its fingers by actions [count, 4]; a grip of -1 closes."""
-        position, velocity = self.position(now), self.velocity(now)
-        free = ARM.answer(position, velocity, asked_displacement(position, actions), frame)
-        ahead, speed = SERVO.moving(frame, world.fidelity.substep, velocity, *free)
+        position, velocity, substep = self.position(now), self.velocity(now), world.fidelity.substep
         opening, fingers = self.opening(now), now.linear_velocity[:, -2:, 1]
+        tips = np.stack([position, position], axis=1)
+        tips[:, :, 1] += (opening + 0.5 * TIP_WIDTH)[:, None] * (-1.0, 1.0)
+        below = support(now, tips, 0.5 * TIP_WIDTH, solids)
+        asked = asked_displacement(position, actions)
+        free = ARM.respond(world, position, velocity, asked, frame, below)
+        ahead, speed = self.SERVO.moving(frame, substep, velocity, free.moved, free.end)
         moved = np.clip(opening + self.OPENED * actions[:, 3], 0.0, self.WIDEST) - opening
         closing = 0.5 * (fingers[:, 0] - fingers[:, 1])
-        opening = opening + SERVO.ahead(frame, world.fidelity.substep, moved, -closing)
+        opening = opening + self.SERVO.ahead(frame, substep, moved, -closing)
         move_set_points(world, self.pads(position + ahead, opening), speed, frame)
+
+    def place(self, world: World, worlds: Array, position: Array) -> None:
+        """Tells the arm that hands were moved, see `Arm.place`."""
+        ARM.place(world, worlds, position)
 
     def pads(self, position: Array, opening: Array) -> Array:
         """Positions [n, 2, 3] m of the fingers of hands at [n, 3] m, each [n] m open."""
-        pads = np.stack([position + _OFFSET] * 2, axis=1)
+        pads = np.stack([position + self.OFFSET] * 2, axis=1)
         pads[:, 0, 1] -= self.HALF + opening
         pads[:, 1, 1] += self.HALF + opening
         return pads
 
     def position(self, now: Readout) -> Array:
         """Position [count, 3] m of the end effector."""
-        return 0.5 * (now.position[:, -2] + now.position[:, -1]) - _OFFSET
+        return 0.5 * (now.position[:, -2] + now.position[:, -1]) - self.OFFSET
 
     def velocity(self, now: Readout) -> Array:
         """Velocity [count, 3] m/s."""
@@ -139,6 +188,28 @@ def asked_displacement(position: Array, actions: Array) -> Array:
 
     The originals move the target up to the table's top if it is below.
     """
-    asked = ARM.stride * actions[:, :3]
+    asked = STRIDE * actions[:, :3]
     asked[:, 2] = np.maximum(asked[:, 2], -position[:, 2])
     return np.asarray(asked)
+
+
+def support(now: Readout, tips: Array, width: float, solids: Solids) -> Array:
+    """Height [count] m of the highest body on which a finger would come to stand; 0: the table.
+
+    Args:
+        now: state of the bodies, taken as not turned.
+        tips: [count, k, 3] m, of the fingers.
+        width: m, half that of a tip along y.
+        solids: of the bodies.
+    """
+    found = np.zeros(len(tips))
+    for body, (half, height) in enumerate(solids):
+        offset = tips - now.position[:, body, None]
+        over = (
+            (np.abs(offset[:, :, 0]) < half + TIP_DEPTH)
+            & (np.abs(offset[:, :, 1]) < half + width)
+            & (offset[:, :, 2] > height)
+        ).any(axis=1)
+        top = now.position[:, body, 2] + height
+        found = np.maximum(found, np.where(over, top, 0.0))
+    return found

@@ -27,6 +27,8 @@ class PandaSlide(PandaObject):
     start_height = 2.0 * HALF_HEIGHT
     goal_height = 2.0 * HALF_HEIGHT
     goal_offset = 0.4
+    solids = ((RADIUS, HALF_HEIGHT),)
+    table = (1.4, -0.1)
     shaping = {"aim": 10.0, "reach": 3.0, "time": -1.0}
 
     def bodies(self) -> list[Body]:

@@ -53,6 +53,7 @@ class PandaStack(PandaTask, GraspingTwin):
     threshold = 0.1
     hand: ClassVar[OpenHand] = OpenHand()
     half = HALF
+    solids = ((HALF, HALF), (HALF, HALF))
     actions = OpenHand.actions
     bounds = observed(hand, *CUBES)
     goal_bounds = components(LIMIT, *along_axes(*CUBES))

@@ -4,11 +4,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from physics import Body, Box, Ground, Material, Readout, Scene, World
+from physics import Body, Box, Ground, Material, Readout, Scene, Static, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
-from rigid_envs.twins.panda.hand import HAND, OBJECT, UNDER_HAND, ClosedHand, OpenHand
+from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand, OpenHand, Solids
 from rigid_envs.twins.twin import Twin, along_axes, components
 
 Array = np.ndarray
@@ -16,18 +16,23 @@ Array = np.ndarray
 LIMIT = 10.0  # of every component, as the original's spaces say; its values can be larger
 RANGE = 0.15  # m, largest offset of starts and goals from their middle along x and y
 HALF = 0.02  # m, half the width of a cube
+HALF_WIDTH, HEIGHT = 0.35, 0.4  # m, of the table
 FRICTION = 0.25  # Coulomb's coefficient of cubes and table
 
 
 class PandaTask(Twin):
-    """A hand over a table without an edge.
+    """A hand over a table.
 
     Attributes:
         hand: the hand.
+        solids: half the width and half the height of each body, m.
+        table: length along x, and middle, m.
     """
 
     ends_on_success = True
     hand: ClassVar[ClosedHand | OpenHand] = ClosedHand()
+    solids: ClassVar[Solids] = ()
+    table: ClassVar[tuple[float, float]] = (1.1, -0.3)
     actions: tuple[str, ...] = ClosedHand.actions
     camera = Camera.around((0.0, 0.0, 0.04), 1.16, azimuth=-75.0, elevation=42.0)
 
@@ -36,14 +41,19 @@ class PandaTask(Twin):
         return []
 
     def scene(self) -> Scene:
-        """The table, what lies on it, and the hand, which slides on it without friction."""
-        table = Ground(Material(FRICTION, 0.0), 0.0, "table", OBJECT, OBJECT)
-        under_hand = Ground(Material(0.0, 0.0), 0.0, "table under the hand", UNDER_HAND, HAND)
-        return Scene(bodies=self.bodies(), statics=[table, under_hand], drives=[self.hand.drive()])
+        """The table, what lies on it, and the hand."""
+        material = Material(FRICTION, 0.0)
+        length, middle = self.table
+        table = Static(
+            Box((0.5 * length, HALF_WIDTH, 0.5 * HEIGHT)), (middle, 0.0, -0.5 * HEIGHT),
+            material=material, name="table", group=OBJECT, mask=OBJECT,
+        )  # fmt: skip
+        floor = Ground(material, -HEIGHT, "floor", OBJECT, OBJECT)
+        return Scene(bodies=self.bodies(), statics=[table, floor], drives=[self.hand.drive()])
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis, as far as the arm gets."""
-        self.hand.act(world, now, actions, self.frame)
+        self.hand.act(world, now, actions, self.frame, self.solids)
 
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """As `bounds` names it: m, m/s, rad and rad/s."""
@@ -69,6 +79,7 @@ class PandaObject(PandaTask):
     start_height: ClassVar[float] = HALF
     goal_height: ClassVar[float] = HALF
     goal_offset: ClassVar[float] = 0.0
+    solids = ((HALF, HALF),)
     goal_bounds = components(LIMIT, *along_axes("object"))
     draw_count = 4
     shaping = {"distance": 10.0, "reach": 3.0}

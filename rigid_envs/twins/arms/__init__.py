@@ -1,0 +1,1 @@
+"""Arms of robots: a chain of hinges, where its hand is, and how it moves under torques."""
