@@ -48,7 +48,7 @@ def pressing(recording: Recording) -> tuple[float, float]:
     for step, actions in enumerate(recording.actions):
         asked = fetch.STRIDE * actions[:, :3]
         arm = FetchReach.hand.arm
-        moved = arm.respond(world, hand[step], velocity[step], asked, FRAME).moved
+        moved = arm.respond(world, hand[step], velocity[step], asked, FRAME).moved[:, -1]
         world.advance(FRAME)
         if step >= len(recording.actions) - 3:
             before.append(hand[step, :, 2])

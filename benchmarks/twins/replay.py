@@ -43,8 +43,7 @@ def replay(recording: Recording, twin: Twin, fidelity: str = "balanced") -> Repl
         if bodies:
             body.append(np.array(now.position[:, 0]))
         if step < len(recording.actions):
-            twin.act(world, now, recording.actions[step])
-            world.advance(twin.frame)
+            twin.advance(world, now, recording.actions[step])
             now = world.read()
     return Replay(np.array(hands), np.array(body))
 

@@ -227,8 +227,8 @@ class Runner:
     def change_fidelity(self, fidelity: str | Fidelity) -> None:
         """Replaces the worlds by worlds of another fidelity, with the episodes that are running.
 
-        Positions, velocities, parameters and times stay. Contacts start again, so the first touch
-        of two solids that touch is now.
+        Positions, velocities, parameters, times and memory stay. Contacts start again, so the first
+        touch of two solids that touch is now.
 
         Args:
             fidelity: name of a preset, or a physics.Fidelity.
@@ -251,6 +251,8 @@ class Runner:
             drive_velocity=old.drive_velocity,
             time=old.time,
         )
+        for name, numbers in old.snapshot().memory.items():
+            new.memory(name, numbers.shape[1])[:] = numbers
         self.world, self._now = new, new.read()
 
     def prepare_fidelity(self, fidelity: str | Fidelity) -> None:
@@ -362,13 +364,13 @@ class Runner:
             commands = self.randomization.add_noise(
                 commands, self._seeds, self._episodes, self._elapsed
             )
-        self.task.act(self.world, self._now, commands)
         if reset_mask is None or not reset_mask.any():
             reset_mask = None
         # before advancing: if one world diverges, the others have advanced all the same
         self._elapsed += 1
         try:
-            self.world.advance(self.task.frame, None if reset_mask is None else ~reset_mask)
+            going = None if reset_mask is None else ~reset_mask
+            self.task.advance(self.world, self._now, commands, going)
         finally:
             self._now = self.world.read()
             if self._pixels:

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from physics import Readout, Scene, World
+from physics import Readout, Scene, SimulationDiverged, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import Goal, Marker
 from rigid_envs.tasks.rewards import Reward
@@ -34,6 +34,7 @@ class Task(ABC):
         actions: names of the action's components. Each component lies within [-1, 1].
         bounds: (name, unit, low, high) of each component of the observation, in order.
         goal_bounds: (name, unit, low, high) of each component of a goal.
+        parts: equal parts of a step; between two of them `proceed` may command the drives again.
         draw_count: how many random numbers the start of an episode needs.
         reward: the success threshold and the weights of the dense reward.
         camera: the camera of rendered frames. It should see the whole workspace.
@@ -52,6 +53,7 @@ class Task(ABC):
     frame: ClassVar[float] = 1.0 / 25.0
     dtype: ClassVar[type[np.floating]] = np.float32
     bounds_end_episodes: ClassVar[bool] = True
+    parts: ClassVar[int] = 1
     max_episode_steps: int = 50
     actions: tuple[str, ...]
     bounds: Bounds
@@ -91,6 +93,35 @@ class Task(ABC):
     @abstractmethod
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Commands the drives for one step, given actions [count, actions] within [-1, 1]."""
+
+    def proceed(self, world: World, part: int) -> None:  # noqa: B027  (most steps have one part)
+        """Commands the drives for a part of a step, from part 1 on."""
+
+    def advance(
+        self, world: World, now: Readout, actions: Array, worlds: Array | None = None
+    ) -> None:
+        """Advances worlds by one step.
+
+        Args:
+            world: the worlds.
+            now: their poses and velocities.
+            actions: [count, actions] within [-1, 1].
+            worlds: mask [count] of the worlds to advance; all if None.
+
+        Raises:
+            SimulationDiverged: a world has diverged. The others have advanced.
+        """
+        self.act(world, now, actions)
+        error = None
+        for part in range(self.parts):
+            if part > 0:
+                self.proceed(world, part)
+            try:
+                world.advance(self.frame / self.parts, worlds)
+            except SimulationDiverged as diverged:
+                error = error or diverged
+        if error is not None:
+            raise error
 
     @abstractmethod
     def observe(self, world: World, now: Readout, out: Array) -> None:

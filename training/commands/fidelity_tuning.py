@@ -51,6 +51,11 @@ def recorded(
     envs = make_vector_env(policy.env_id, WORLDS, **kwargs).unwrapped
     if not isinstance(envs, RigidVectorEnv):
         raise UsageError(f"{policy.env_id} has no fidelity: it isn't an environment of rigid-envs")
+    if envs.runner.task.parts > 1:
+        raise UsageError(
+            f"{policy.env_id} commands its drives {envs.runner.task.parts} times in a step, which "
+            "can't be repeated at other fidelities: tune with an environment that does so once"
+        )
     policy.check(envs.single_observation_space)
     observation, _ = envs.reset(seed=seed)
     actions = []

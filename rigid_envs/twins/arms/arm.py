@@ -28,8 +28,8 @@ class Response(NamedTuple):
     """What a hand does in a step.
 
     Attributes:
-        moved: [count, 3] m, its displacement.
-        end: [count, 3] m/s, its velocity at the end.
+        moved: [count, parts, 3] m, its displacement until the end of each part of the step.
+        end: [count, parts, 3] m/s, its velocity then.
         load: [count] N, mean force with which it presses on what is below.
     """
 
@@ -48,6 +48,7 @@ class Arm:
         speeds: [n] rad/s, at the start of an episode.
         base: [3] m, position of the chain's origin.
         rise: m/s, its velocity upwards.
+        parts: equal parts of a step at whose ends a response says where the hand is.
     """
 
     def __init__(
@@ -58,8 +59,9 @@ class Arm:
         speeds: Array,
         base: Array,
         rise: float = 0.0,
+        parts: int = 1,
     ) -> None:
-        self.chain, self.entry, self.base = chain, entry, base
+        self.chain, self.entry, self.base, self.parts = chain, entry, base, parts
         self.start, self.rise = np.concatenate([angles, speeds]), np.array([0.0, 0.0, rise])
 
     @cached_property
@@ -91,11 +93,8 @@ class Arm:
         """
         below = np.zeros(world.count) if support is None else support
         from_base = position - self.base - self.rise * world.time[:, None]
-        moved, end, load = (
-            np.empty((world.count, 3)),
-            np.empty((world.count, 3)),
-            np.empty(world.count),
-        )
+        moved, end = np.empty((2, world.count, self.parts, 3))
+        load = np.empty(world.count)
         known = (
             self.chain, self.start, world.memory("arm", len(self.start)),
             *(
@@ -110,7 +109,8 @@ class Arm:
             return 0
 
         run_in_blocks(run, -(-world.count // LANES), world.threads)
-        return Response(moved + frame * self.rise, end + self.rise, load)
+        times = frame / self.parts * np.arange(1, self.parts + 1)[:, None]
+        return Response(moved + times * self.rise, end + self.rise, load)
 
     def place(self, world: World, worlds: Array, position: Array) -> None:
         """Brings the hinges to hands that were moved, at rest.
@@ -201,19 +201,26 @@ def read(start, hinges, position, velocity, asked, support, group, work):
 
 
 @stage
-def write(start, group, work, hinges, moved, end, load):
-    """Keeps angles and speeds; writes how the hands have moved, and their velocities."""
+def write_part(part, group, work, moved, end):
+    """Writes how far the hands have moved until the end of a part, and their velocities."""
+    for lane in range(min(LANES, len(moved) - group * LANES)):
+        world = group * LANES + lane
+        for a in range(3):
+            moved[world, part, a] = work.origin[JOINTS, a, lane] - work.position[a, lane]
+            end[world, part, a] = 0.0
+            for i in range(JOINTS):
+                end[world, part, a] += work.jacobian[a, i, lane] * work.speeds[i, lane]
+
+
+@stage
+def write(start, group, work, hinges, load):
+    """Keeps angles and speeds; writes how hard the hands press."""
     for lane in range(min(LANES, len(hinges) - group * LANES)):
         world = group * LANES + lane
+        load[world] = work.load[lane]
         for i in range(JOINTS):
             hinges[world, i] = work.angles[i, lane] - start[i]
             hinges[world, JOINTS + i] = work.speeds[i, lane] - start[JOINTS + i]
-        load[world] = work.load[lane]
-        for a in range(3):
-            moved[world, a] = work.origin[JOINTS, a, lane] - work.position[a, lane]
-            end[world, a] = 0.0
-            for i in range(JOINTS):
-                end[world, a] += work.jacobian[a, i, lane] * work.speeds[i, lane]
 
 
 @stage

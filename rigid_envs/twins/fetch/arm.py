@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from physics.compiler.jit import entry
-from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write
+from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write, write_part
 from rigid_envs.twins.arms.chain import Link, differentiate, locate, make_chain
 from rigid_envs.twins.arms.dynamics import weigh
 from rigid_envs.twins.fetch.weld import (
@@ -97,7 +97,8 @@ def _make_move() -> Any:
                     hold_back(work)
                 else:
                     pull(chain, work)
-            write(start, group, work, hinges, moved, end, load)
+            write_part(0, group, work, moved, end)
+            write(start, group, work, hinges, load)
 
     return move
 

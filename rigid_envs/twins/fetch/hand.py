@@ -180,7 +180,8 @@ def _follow(
         How far ahead of the hand it starts, [n, 3] m, and its velocity, [n, 3] m/s.
     """
     position, velocity = hand.position(now), hand.velocity(now).astype(float)
-    moved, end, _ = hand.arm.respond(world, position, velocity, STRIDE * actions[:, :3], frame)
+    free = hand.arm.respond(world, position, velocity, STRIDE * actions[:, :3], frame)
+    moved, end = free.moved[:, 0], free.end[:, 0]
     kept = braked(position[:, 2], moved)[:, None]
     moved[:, :2] *= kept
     end[:, :2] *= kept

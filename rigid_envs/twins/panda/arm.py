@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from physics.compiler.jit import entry
-from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write
+from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write, write_part
 from rigid_envs.twins.arms.chain import Link, differentiate, locate, make_chain
 from rigid_envs.twins.arms.dynamics import weigh
 from rigid_envs.twins.arms.linear import invert
@@ -79,23 +79,24 @@ def _make_move() -> Any:
     ):  # fmt: skip
         for group in range(first, last):
             read(start, hinges, position, velocity, asked, support, group, work)
-            for piece in range(-1, PIECES + 1):
-                inside = 0 <= piece < PIECES
-                predict(work, 0.5 * SUBSTEPS / PIECES * SUBSTEP if inside else 0.0)
+            for phase in range(2 * PIECES + 1):  # start, and middle and end of each piece
+                middle = phase % 2 == 1
+                predict(work, 0.5 * SUBSTEPS / PIECES * SUBSTEP if middle else 0.0)
                 locate(chain, work.vector[0], work)
                 differentiate(work)
-                if piece == PIECES:
-                    break
+                if phase > 0 and not middle:
+                    write_part(phase // 2 - 1, group, work, moved, end)
+                    continue
                 weigh(chain, work)
                 invert(work.mass_matrix, work.inverse[0], work.matrix[0], JOINTS)
-                if piece == -1:
+                if middle:
+                    drive(work, touch(work))
+                else:
                     hold_back(work)
                     solve_for_angles(chain, SUBSTEP, work)
-                else:
-                    drive(work, touch(work))
-            write(start, group, work, hinges, moved, end, load)
+            write(start, group, work, hinges, load)
 
     return move
 
 
-ARM = Arm(CHAIN, _make_move, NEUTRAL, np.zeros(len(NEUTRAL)), BASE)
+ARM = Arm(CHAIN, _make_move, NEUTRAL, np.zeros(len(NEUTRAL)), BASE, parts=PIECES)

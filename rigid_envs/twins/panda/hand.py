@@ -78,16 +78,19 @@ class ClosedHand:
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float, solids: Solids) -> None:
-        """Moves the hand by actions [count, 3], over bodies with these solids."""
-        position, velocity = self.position(now), self.velocity(now)
+        """Plans the hand's path for actions [count, 3], over bodies with these solids."""
+        position = self.position(now)
         below = support(now, position[:, None], TIP_WIDTH, solids)
-        asked = asked_displacement(position, actions)
-        free = ARM.respond(world, position, velocity, asked, frame, below)
-        substep = world.fidelity.substep
-        ahead, speed = self.SERVO.moving(frame, substep, velocity, free.moved, free.end)
-        pressed = np.where(below > 0.0, free.load, 0.0)  # the engine has objects, but no table
+        plan(world, position, self.velocity(now), actions, frame, below)
+        self.proceed(world, now, 0, frame)
+
+    def proceed(self, world: World, now: Readout, part: int, frame: float) -> None:
+        """Moves the hand along its path for a part of a step."""
+        time, substep, velocity = frame / ARM.parts, world.fidelity.substep, self.velocity(now)
+        moved, end, pressed = path(world, part)
+        ahead, speed = self.SERVO.moving(time, substep, velocity, moved, end)
         ahead[:, 2] -= pressed / (MASS * self.SERVO.frequency**2)
-        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
+        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, time)
 
     def position(self, now: Readout) -> Array:
         """Position [count, 3] m of the end effector."""
@@ -135,19 +138,27 @@ class OpenHand:
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float, solids: Solids) -> None:
-        """Moves the hand and its fingers by actions [count, 4]; a grip of -1 closes."""
-        position, velocity, substep = self.position(now), self.velocity(now), world.fidelity.substep
-        opening, fingers = self.opening(now), now.linear_velocity[:, -2:, 1]
+        """Plans the path of hand and fingers for actions [count, 4]; a grip of -1 closes."""
+        position, opening = self.position(now), self.opening(now)
         tips = np.stack([position, position], axis=1)
         tips[:, :, 1] += (opening + 0.5 * TIP_WIDTH)[:, None] * (-1.0, 1.0)
         below = support(now, tips, 0.5 * TIP_WIDTH, solids)
-        asked = asked_displacement(position, actions)
-        free = ARM.respond(world, position, velocity, asked, frame, below)
-        ahead, speed = self.SERVO.moving(frame, substep, velocity, free.moved, free.end)
+        plan(world, position, self.velocity(now), actions, frame, below)
         moved = np.clip(opening + self.OPENED * actions[:, 3], 0.0, self.WIDEST) - opening
+        world.memory("fingers", 1)[:, 0] = moved / ARM.parts
+        self.proceed(world, now, 0, frame)
+
+    def proceed(self, world: World, now: Readout, part: int, frame: float) -> None:
+        """Moves the hand along its path, and its fingers, for a part of a step."""
+        time, substep, velocity = frame / ARM.parts, world.fidelity.substep, self.velocity(now)
+        moved, end, _ = path(world, part)
+        ahead, speed = self.SERVO.moving(time, substep, velocity, moved, end)
+        fingers, more = now.linear_velocity[:, -2:, 1], world.memory("fingers", 1)[:, 0]
+        opening = np.clip(self.opening(now) + more, 0.0, self.WIDEST) - self.opening(now)
         closing = 0.5 * (fingers[:, 0] - fingers[:, 1])
-        opening = opening + self.SERVO.ahead(frame, substep, moved, -closing)
-        move_set_points(world, self.pads(position + ahead, opening), speed, frame)
+        opening = self.opening(now) + self.SERVO.ahead(time, substep, opening, -closing)
+        pads = self.pads(self.position(now) + ahead, opening)
+        move_set_points(world, pads, speed, time)
 
     def place(self, world: World, worlds: Array, position: Array) -> None:
         """Tells the arm that hands were moved, see `Arm.place`."""
@@ -191,6 +202,25 @@ def asked_displacement(position: Array, actions: Array) -> Array:
     asked = STRIDE * actions[:, :3]
     asked[:, 2] = np.maximum(asked[:, 2], -position[:, 2])
     return np.asarray(asked)
+
+
+def plan(
+    world: World, position: Array, velocity: Array, actions: Array, frame: float, below: Array
+) -> None:
+    """Keeps the path of hands [count] in the world's memory, for `path`."""
+    asked = asked_displacement(position, actions)
+    free = ARM.respond(world, position, velocity, asked, frame, below)
+    kept = world.memory("path", 6 * ARM.parts + 1)
+    moved = np.diff(free.moved, axis=1, prepend=0.0)
+    kept[:, :-1] = np.concatenate([moved, free.end], axis=2).reshape(world.count, -1)
+    kept[:, -1] = np.where(below > 0.0, free.load, 0.0)  # the engine has objects, but no table
+
+
+def path(world: World, part: int) -> tuple[Array, Array, Array]:
+    """Displacement [count, 3] m in a part of the step, velocity then, and force on objects, N."""
+    kept = world.memory("path", 6 * ARM.parts + 1)
+    one = kept[:, 6 * part : 6 * (part + 1)]
+    return one[:, :3], one[:, 3:], kept[:, -1]
 
 
 def support(now: Readout, tips: Array, width: float, solids: Solids) -> Array:

@@ -44,7 +44,12 @@ class PandaSlide(PandaObject):
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis; the puck's speed is damped."""
         super().act(world, now, actions)
-        world.apply_wrench(-DAMPING * MASS * now.linear_velocity[:, 0], body="puck")
+        damp(world, now)
+
+    def proceed(self, world: World, part: int) -> None:
+        """Moves the hand on along its path; the puck's speed is damped."""
+        super().proceed(world, part)
+        damp(world, world.read())
 
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
@@ -65,3 +70,8 @@ class PandaSlide(PandaObject):
         reach = distance(self.hand.position(now), behind(achieved, desired))
         gone = achieved[:, 0] > REACH
         return {"aim": -miss, "reach": np.where(gone, 0.0, -reach)}
+
+
+def damp(world: World, now: Readout) -> None:
+    """Damps the puck's speed until the drives are commanded again."""
+    world.apply_wrench(-DAMPING * MASS * now.linear_velocity[:, 0], body="puck")

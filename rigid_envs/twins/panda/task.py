@@ -8,6 +8,7 @@ from physics import Body, Box, Ground, Material, Readout, Scene, Static, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
+from rigid_envs.twins.panda.arm import ARM
 from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand, OpenHand, Solids
 from rigid_envs.twins.twin import Twin, along_axes, components
 
@@ -30,6 +31,7 @@ class PandaTask(Twin):
     """
 
     ends_on_success = True
+    parts = ARM.parts
     hand: ClassVar[ClosedHand | OpenHand] = ClosedHand()
     solids: ClassVar[Solids] = ()
     table: ClassVar[tuple[float, float]] = (1.1, -0.3)
@@ -54,6 +56,10 @@ class PandaTask(Twin):
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis, as far as the arm gets."""
         self.hand.act(world, now, actions, self.frame, self.solids)
+
+    def proceed(self, world: World, part: int) -> None:
+        """Moves the hand on along its path."""
+        self.hand.proceed(world, world.read(), part, self.frame)
 
     def observe(self, world: World, now: Readout, out: Array) -> None:
         """As `bounds` names it: m, m/s, rad and rad/s."""

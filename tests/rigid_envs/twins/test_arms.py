@@ -1,5 +1,6 @@
 """Chains of hinges obey the laws of mechanics; arms follow hands that are moved or held back."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from rigid_envs.twins.arms.dynamics import GRAVITY, weigh
 from rigid_envs.twins.arms.linear import factor, invert, solve
 from rigid_envs.twins.fetch import arm as fetch
 from rigid_envs.twins.panda import arm as panda
+from rigid_envs.twins.panda.hand import path
 
 CHAINS = {"fetch": fetch.CHAIN, "panda": panda.CHAIN}
 
@@ -137,8 +139,7 @@ def test_arms_follow_hands_that_are_moved(name):
     twin.start(world, np.ones(20, dtype=bool), draws)
     start = np.array(twin.hand.position(world.read()))
     for _ in range(5):
-        twin.act(world, world.read(), np.zeros((20, 4)))
-        world.advance(twin.frame)
+        twin.advance(world, world.read(), np.zeros((20, 4)))
     assert np.abs(twin.hand.position(world.read()) - start)[:, :2].max() < 3e-3
 
 
@@ -171,8 +172,45 @@ def test_worlds_do_not_depend_on_their_neighbours_or_threads():
     for first, last, threads in ((0, 40, 1), (0, 40, 3), (17, 18, 1)):
         world = World(twin.scene(), "balanced", last - first, threads)
         for step in actions[:, first:last]:
-            twin.act(world, world.read(), step)
-            world.advance(twin.frame)
+            twin.advance(world, world.read(), step)
         found.append(world.memory("arm", 2 * JOINTS))
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0][17:18], found[2])
+
+
+def test_hinges_belong_to_the_state_of_episodes():
+    """Saved and restored, and kept where the fidelity changes."""
+    env = gym.make("RigidEnvs/PandaPush-v0").unwrapped
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (8, 3)).astype(np.float32)
+    for action in actions[:4]:
+        env.step(action)
+    saved = env.get_state()
+    first = [env.step(action)[0]["observation"] for action in actions[4:]]
+    env.set_state(saved)
+    again = [env.step(action)[0]["observation"] for action in actions[4:]]
+    np.testing.assert_array_equal(first, again)
+    before = env._runner.world.memory("arm", 2 * JOINTS).copy()
+    assert before.any()
+    env._runner.change_fidelity("fast")
+    np.testing.assert_array_equal(env._runner.world.memory("arm", 2 * JOINTS), before)
+    env.reset(seed=1)
+    assert not env._runner.world.memory("arm", 2 * JOINTS).any()
+
+
+def test_a_hand_follows_its_arm_also_within_a_step():
+    """At the end of each part of a step the engine's hand is where the arm's is."""
+    twin = TWINS["panda_reach"]()
+    world = World(twin.scene(), "balanced", 4)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        now = world.read()
+        twin.act(world, now, rng.uniform(-1.0, 1.0, (4, 3)))
+        for part in range(twin.parts):
+            if part > 0:
+                twin.proceed(world, part)
+            before, (moved, end, _) = twin.hand.position(world.read()), path(world, part)
+            world.advance(twin.frame / twin.parts)
+            now = world.read()
+            assert twin.hand.position(now) - before == pytest.approx(moved, abs=1e-6)
+            assert twin.hand.velocity(now) == pytest.approx(end, abs=1e-4)
