@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics import World
-from physics.compiler.jit import LANES, entry, stage
+from physics.compiler.jit import LANES, entry, sequence, stage
 from physics.step.threads import run_in_blocks
 from rigid_envs.twins.arms.chain import Chain, differentiate, locate
 from rigid_envs.twins.arms.linear import factor, solve
@@ -231,7 +231,7 @@ def predict(work, time):
             work.vector[0, i, lane] = work.angles[i, lane] + time * work.speeds[i, lane]
 
 
-@stage
+@sequence
 def hold_back(work):
     """Moves the hinges to hands that were held back, as forces F on these would do.
 

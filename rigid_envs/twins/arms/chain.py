@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compiler.jit import LANES, stage
+from physics.compiler.jit import LANES, sequence, stage
 from rigid_envs.twins.arms.work import JOINTS
 
 Array = np.ndarray
@@ -105,7 +105,7 @@ def rotation_to_axis(axis: Array) -> Array:
     return np.array([[a, b, x], [b, c, y], [-x, -y, z]])
 
 
-@stage
+@sequence
 def locate(chain, angles, work):
     """Writes the poses of chains whose hinges have these angles [n, LANES] rad; bases are at zero.
 

@@ -9,7 +9,7 @@ is at the world's origin; moments [6] are about that origin, with forces after t
 
 import numpy as np
 
-from physics.compiler.jit import LANES, stage
+from physics.compiler.jit import LANES, sequence, stage
 from rigid_envs.twins.arms.work import JOINTS
 
 Array = np.ndarray
@@ -17,7 +17,7 @@ Array = np.ndarray
 GRAVITY = 9.81  # m/s^2
 
 
-@stage
+@sequence
 def weigh(chain, work):
     """Writes mass matrix and bias of chains at their pose and speeds."""
     axis, body, force = work.axis, work.body, work.force
