@@ -235,7 +235,7 @@ class World(Readings):
             target: [count, drives, 3] m, or what broadcasts to it.
             time: s, duration of the motion. With 0 the set points are there at once, and the servos
                 answer a step.
-            renew_forces: compute forces anew, so that servos follow the command from now on. Else
+            renew_forces: compute forces again, so that servos follow the command from now on. Else
                 the first half of the next substep is still under the forces of the last one, as
                 integrators keep them.
 

@@ -725,7 +725,7 @@ def test_memory_belongs_to_the_state():
 
 
 def test_drives_follow_a_command_from_the_next_instant_on():
-    """With forces computed anew, a motion follows from its start and command, not from its past."""
+    """With forces computed again, a motion follows from start and command, not from the past."""
     drive = Drive(Box((0.01,) * 3), mass=1.0, force_limit=1e6, frequency=50.0, damping_ratio=1.0)
 
     def start(far, time):

@@ -15,6 +15,7 @@ from physics import World
 from physics.compiler.jit import LANES, entry, sequence, stage
 from physics.step.threads import run_in_blocks
 from rigid_envs.twins.arms.chain import Chain, differentiate, locate
+from rigid_envs.twins.arms.dynamics import answer
 from rigid_envs.twins.arms.linear import factor, solve
 from rigid_envs.twins.arms.work import JOINTS, WORK
 
@@ -239,19 +240,7 @@ def hold_back(work):
     dq = M^-1 J^T (J M^-1 J^T)^-1 dx; velocities likewise.
     """
     J, along, compliance, load = work.jacobian, work.matrix[0], work.matrix[1], work.vector[0]
-    for a in range(3):
-        for i in range(JOINTS):
-            for lane in range(LANES):
-                along[a, i, lane] = 0.0
-            for j in range(JOINTS):
-                for lane in range(LANES):
-                    along[a, i, lane] += work.inverse[0, i, j, lane] * J[a, j, lane]
-        for b in range(a + 1):
-            for lane in range(LANES):
-                compliance[a, b, lane] = 0.0
-            for i in range(JOINTS):
-                for lane in range(LANES):
-                    compliance[a, b, lane] += J[b, i, lane] * along[a, i, lane]
+    answer(J, 3, work.inverse[0], along, compliance)
     factor(compliance, 3)
     for kind in range(2):  # angles, speeds
         for a in range(3):

@@ -70,6 +70,32 @@ def weigh(chain, work):
 
 
 @stage
+def answer(jacobian, rows, inverse, along, compliance):
+    """Writes how hinges and points of an arm answer forces on the points.
+
+    Args:
+        jacobian: [rows, n, LANES], velocities of the points per speed of the hinges.
+        rows: how many.
+        inverse: [n, n, LANES], of the mass matrices.
+        along: [rows, n, LANES], what is written: M^-1 J^T, transposed.
+        compliance: [rows, rows, LANES], what is written: the lower half of J M^-1 J^T.
+    """
+    for a in range(rows):
+        for i in range(JOINTS):
+            for lane in range(LANES):
+                along[a, i, lane] = 0.0
+            for j in range(JOINTS):
+                for lane in range(LANES):
+                    along[a, i, lane] += inverse[i, j, lane] * jacobian[a, j, lane]
+        for b in range(a + 1):
+            for lane in range(LANES):
+                compliance[a, b, lane] = 0.0
+            for i in range(JOINTS):
+                for lane in range(LANES):
+                    compliance[a, b, lane] += jacobian[b, i, lane] * along[a, i, lane]
+
+
+@stage
 def _move_axis(rotation, origin, axis):
     for lane in range(LANES):
         x, y, z = rotation[0, 2, lane], rotation[1, 2, lane], rotation[2, 2, lane]

@@ -16,6 +16,7 @@ import numpy as np
 
 from physics.compiler.jit import LANES, sequence, stage
 from rigid_envs.twins.arms.chain import locate
+from rigid_envs.twins.arms.dynamics import answer
 from rigid_envs.twins.arms.linear import factor, invert, solve
 from rigid_envs.twins.arms.work import JOINTS
 
@@ -60,19 +61,7 @@ def prepare(work):
             weld[1, i, lane] = J[1, i, lane] + dz * wx - dx * wz
             weld[2, i, lane] = J[2, i, lane] + dx * wy - dy * wx
             weld[3, i, lane], weld[4, i, lane], weld[5, i, lane] = 0.5 * wx, 0.5 * wy, 0.5 * wz
-    for a in range(6):
-        for i in range(JOINTS):
-            for lane in range(LANES):
-                along[a, i, lane] = 0.0
-            for j in range(JOINTS):
-                for lane in range(LANES):
-                    along[a, i, lane] += work.inverse[0, i, j, lane] * weld[a, j, lane]
-        for b in range(a + 1):
-            for lane in range(LANES):
-                compliance[a, b, lane] = 0.0
-            for i in range(JOINTS):
-                for lane in range(LANES):
-                    compliance[a, b, lane] += weld[b, i, lane] * along[a, i, lane]
+    answer(weld, 6, work.inverse[0], along, compliance)
 
 
 @stage

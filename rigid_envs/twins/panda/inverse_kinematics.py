@@ -18,7 +18,7 @@ def solve_for_angles(chain, ahead, work):
     """Writes to `work.aim` the angles at which the hands, pointing down, are near where asked.
 
     Each iteration adds (J^T J + damping)^-1 J^T e, where e are the errors of position and
-    orientation. Errors and J are computed anew after `FRESH` iterations, and linear in between.
+    orientation. Errors and J are computed again after `FRESH` iterations, and linear in between.
 
     Args:
         chain: the arm.

@@ -196,7 +196,8 @@ def _find_sides(work, rows):
             old, new = side[r, lane], side[r, lane]
             new = 1.0 if old == 0.0 and impulse[r, lane] > work.high[r, lane] else new
             new = -1.0 if old == 0.0 and impulse[r, lane] < work.low[r, lane] else new
-            new = 0.0 if left[r, lane] * old < 0.0 else new
+            free = work.low[r, lane] < work.high[r, lane]  # friction needs a force
+            new = 0.0 if free and left[r, lane] * old < 0.0 else new
             side[r, lane] = new
             changes += abs(new - old)
     return changes

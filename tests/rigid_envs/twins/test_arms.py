@@ -167,7 +167,8 @@ def test_hinges_follow_hands_that_are_held_back_as_they_would_follow_a_force(cha
 
 def test_worlds_do_not_depend_on_their_neighbours_or_threads():
     twin = TWINS["panda_reach"]()
-    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (10, 40, 3))
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (15, 40, 3))
+    actions[:, ::2, 2] = -1.0  # every second hand comes to press on the table
     found = []
     for first, last, threads in ((0, 40, 1), (0, 40, 3), (17, 18, 1)):
         world = World(twin.scene(), "balanced", last - first, threads)
@@ -176,6 +177,8 @@ def test_worlds_do_not_depend_on_their_neighbours_or_threads():
         found.append(world.memory("arm", 2 * JOINTS))
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0][17:18], found[2])
+    height = twin.hand.position(world.read())[:, 2]
+    assert height > 0.05  # the one by itself is in the air, beside hands on the table
 
 
 def test_hinges_belong_to_the_state_of_episodes():

@@ -20,7 +20,7 @@ from rigid_envs.twins.servo import Servo
 @pytest.mark.parametrize(
     ("name", "twin", "median"),
     [("fetch-axes", "fetch_reach", 0.3e-3), ("fetch-motions", "fetch_reach", 0.3e-3),
-     ("panda-axes", "panda_reach", 0.8e-3), ("panda-motions", "panda_reach", 1.6e-3)],
+     ("panda-axes", "panda_reach", 0.8e-3), ("panda-motions", "panda_reach", 1.2e-3)],
 )  # fmt: skip
 def test_the_hand_is_where_the_original_is_after_twelve_steps(name, twin, median):
     recording = Recording.load(name)

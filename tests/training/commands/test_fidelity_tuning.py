@@ -10,6 +10,7 @@ from physics import Fidelity, World
 from physics.tuning.reference import Reference
 from physics.tuning.tune import Tuned
 from training.commands import cli, fidelity_tuning
+from training.settings.errors import UsageError
 
 POLICIES = Path(__file__).parents[3] / "results" / "ppo"
 
@@ -88,3 +89,11 @@ def test_arguments_of_the_environment_replace_those_of_the_policy(asked):
 def test_mistakes_are_named(words, message, capsys):
     assert tune_fidelity(*words) == 2
     assert message in capsys.readouterr().err
+
+
+def test_steps_of_several_parts_are_refused():
+    class Pusher:
+        env_id, env_kwargs = "RigidEnvs/PandaPush-v0", {}
+
+    with pytest.raises(UsageError, match="PandaPush-v0 commands its drives 4 times in a step"):
+        fidelity_tuning.recorded(Pusher(), 1, 0)
