@@ -28,8 +28,9 @@ def main() -> None:
     elif options.command == "identify":
         frequency, damping = identify.servo(recordings.Recording.load("fetch-motions"))
         print(f"Fetch hand: frequency {frequency:.1f} rad/s, damping ratio {damping:.2f}")
-        sliding, creeping = identify.pressing(recordings.Recording.load("fetch-presses"))
-        print(f"it presses on the table: sliding {sliding:.2f}, creeping {creeping:.2f}")
+        sliding, creeping, sinking = identify.pressing(recordings.Recording.load("fetch-presses"))
+        print(f"it presses on the table: sliding {sliding:.2f}, creeping {creeping:.2f}, "
+              f"sinking {sinking:.2f}")  # fmt: skip
         slides = recordings.Recording.load("fetch-slides")
         sliding, creeping, gliding = identify.braking(slides)
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "

@@ -40,28 +40,30 @@ def servo(recording: Recording) -> tuple[float, float]:
     return frequency, damping
 
 
-def pressing(recording: Recording) -> tuple[float, float]:
-    """`SLIDING` and `CREEPING` of Fetch hands that press on the table, from their last steps."""
+def pressing(recording: Recording) -> tuple[float, float, float]:
+    """`SLIDING`, `CREEPING` and `SINKING` of Fetch hands that press on the table.
+
+    From their last steps.
+    """
     hand, velocity = recording.observations[..., :3], recording.observations[..., 5:8] / FRAME
     world = World(FetchReach().scene(), count=hand.shape[1])
-    before, found, free = [], [], []
+    steps = []
     for step, actions in enumerate(recording.actions):
         asked = fetch.STRIDE * actions[:, :3]
         arm = FetchReach.hand.arm
         moved = arm.respond(world, hand[step], velocity[step], asked, FRAME).moved[:, -1]
         world.advance(FRAME)
-        if step >= len(recording.actions) - 3:
-            before.append(hand[step, :, 2])
-            found.append(hand[step + 1, :, 1] - hand[step, :, 1])
-            free.append(moved)
-    height, along, without = np.concatenate(before), np.concatenate(found), np.concatenate(free)
+        steps.append((hand[step], hand[step + 1], moved))
+    before, after, free = (np.concatenate(parts) for parts in zip(*steps[-3:], strict=True))
+    kept = (after - before)[:, 1] / free[:, 1]
 
     def lack(parameters: Array) -> Array:
-        kept = fetch.braked(height, without, *parameters)
-        return np.asarray(kept - along / without[:, 1])
+        return np.asarray(fetch.braked(before[:, 2], free, *parameters) - kept)
 
     sliding, creeping = least_squares(lack, (1.0, 0.5)).x
-    return float(sliding), float(creeping)
+    below = np.maximum(fetch.RESTING - before[:, 2] - free[:, 2], 0.0)
+    sinking = below @ (fetch.RESTING - after[:, 2]) / (below @ below)
+    return float(sliding), float(creeping), float(sinking)
 
 
 def braking(recording: Recording) -> tuple[float, float, float]:

@@ -240,7 +240,7 @@ def hold_back(work):
     dq = M^-1 J^T (J M^-1 J^T)^-1 dx; velocities likewise.
     """
     J, along, compliance, load = work.jacobian, work.matrix[0], work.matrix[1], work.vector[0]
-    answer(J, 3, work.inverse[0], along, compliance)
+    answer(J, 3, work.factored[0], along, compliance)
     factor(compliance, 3)
     for kind in range(2):  # angles, speeds
         for a in range(3):

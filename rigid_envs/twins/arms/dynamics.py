@@ -10,6 +10,7 @@ is at the world's origin; moments [6] are about that origin, with forces after t
 import numpy as np
 
 from physics.compiler.jit import LANES, sequence, stage
+from rigid_envs.twins.arms.linear import factor, solve
 from rigid_envs.twins.arms.work import JOINTS
 
 Array = np.ndarray
@@ -70,23 +71,31 @@ def weigh(chain, work):
 
 
 @stage
-def answer(jacobian, rows, inverse, along, compliance):
+def factor_masses(work):
+    """Writes to `work.factored[0]` the factors of the mass matrices."""
+    for i in range(JOINTS):
+        for j in range(i + 1):
+            for lane in range(LANES):
+                work.factored[0, i, j, lane] = work.mass_matrix[i, j, lane]
+    factor(work.factored[0], JOINTS)
+
+
+@stage
+def answer(jacobian, rows, factored, along, compliance):
     """Writes how hinges and points of an arm answer forces on the points.
 
     Args:
         jacobian: [rows, n, LANES], velocities of the points per speed of the hinges.
         rows: how many.
-        inverse: [n, n, LANES], of the mass matrices.
+        factored: [n, n, LANES], factors of the mass matrices, see `linear.factor`.
         along: [rows, n, LANES], what is written: M^-1 J^T, transposed.
         compliance: [rows, rows, LANES], what is written: the lower half of J M^-1 J^T.
     """
     for a in range(rows):
         for i in range(JOINTS):
             for lane in range(LANES):
-                along[a, i, lane] = 0.0
-            for j in range(JOINTS):
-                for lane in range(LANES):
-                    along[a, i, lane] += inverse[i, j, lane] * jacobian[a, j, lane]
+                along[a, i, lane] = jacobian[a, i, lane]
+        solve(factored, along[a], JOINTS)
         for b in range(a + 1):
             for lane in range(LANES):
                 compliance[a, b, lane] = 0.0

@@ -42,16 +42,3 @@ def solve(factored, x, count):
                 x[i, lane] -= factored[k, i, lane] * x[k, lane]
         for lane in range(LANES):
             x[i, lane] *= factored[i, i, lane]
-
-
-@stage
-def invert(matrix, inverse, work, count):
-    """Writes the inverses of positive definite matrices; `work` is overwritten."""
-    for i in range(count):
-        for j in range(count):
-            for lane in range(LANES):
-                work[i, j, lane] = matrix[i, j, lane]
-                inverse[i, j, lane] = 1.0 if i == j else 0.0
-    factor(work, count)
-    for i in range(count):
-        solve(work, inverse[i], count)

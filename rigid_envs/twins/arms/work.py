@@ -9,6 +9,7 @@ from physics.compiler.jit import LANES
 
 JOINTS = 7  # n, hinges of each arm
 ROWS = JOINTS + 3  # of what limits impulses: motors, and a table along three axes
+WIDTH = 12  # of arrays of rows: whole vectors
 
 WORK = np.dtype(
     [
@@ -22,10 +23,10 @@ WORK = np.dtype(
             ("origin", (JOINTS + 1, 3)),
             # how the hand moves with the hinges: m/s and rad/s per rad/s
             ("jacobian", (6, JOINTS)),
-            # mass matrix in kg m^2, its inverse, the inverse with what slows hinges down, and
-            # the torque in N m that keeps the speeds
+            # mass matrix in kg m^2, its factors, factors with what slows hinges down, and the
+            # torque in N m that keeps the speeds
             ("mass_matrix", (JOINTS, JOINTS)),
-            ("inverse", (2, JOINTS, JOINTS)),
+            ("factored", (2, JOINTS, JOINTS)),
             ("bias", (JOINTS,)),
             # of the dynamics: velocity of what turns about a hinge with 1 rad/s; inertia about the
             # world's origin of a link, later of all that it carries (mass, first moments x, y, z,
@@ -40,20 +41,26 @@ WORK = np.dtype(
             ("asked", (3,)),
             ("target", (3,)),
             ("aim", (JOINTS,)),  # rad, of motors
-            # limited impulses, of motors and of a table: how hinges answer them, velocities per
-            # impulse, rows of the table's Jacobian, distance from it in m, and working memory
-            ("along", (ROWS, JOINTS)),
-            ("response", (ROWS, ROWS)),
-            ("system", (ROWS, ROWS)),
-            ("contact", (3, JOINTS)),
+            # of a table: distance from it in m, impulse on the hand in N s in the substep before
             ("gap", ()),
+            ("pressed", ()),
+            ("sides", (ROWS,)),  # of rows of `limits`
             # height in m of what is below the hand, and with which force in N it presses on it
             ("support", ()),
             ("load", ()),
-            *((field, (ROWS,)) for field in ("impulse", "lack", "left", "side", "low", "high")),
             # working memory
             ("matrix", (5, JOINTS, JOINTS)),
-            ("vector", (4, JOINTS)),
+            ("vector", (5, JOINTS)),
+        )
+    ]
+    # of one world: limited impulses, see `limits`, and a table's rows of the Jacobian
+    + [
+        (name, np.float64, shape)
+        for name, shape in (
+            ("system", (ROWS, WIDTH)),
+            ("contact", (3, JOINTS)),
+            *((field, (WIDTH,)) for field in ("lack", "low", "high", "side", "impulse", "gain")),
+            *((field, (WIDTH,)) for field in ("given", "found", "new_side", "column", "scaled")),
         )
     ]
 )

@@ -1,12 +1,9 @@
 """The hand of the Fetch robot.
 
-In the originals a weld pulls the hand towards a mocap body. Each step puts that body 5 cm times the
-action ahead of where the hand is, so the hand answers a step; under load it hangs back, and nothing
-makes up for it. The weld holds the hand as a spring and damper would: a servo whose frequency and
-damping `python -m benchmarks.twins identify` finds from recorded motions. It is weaker where the
-arm is stretched, until the hand gets no farther. The table brakes a hand that presses on it: a fast
-one as Coulomb friction would; a slow one creeps, braked in proportion to its speed. Frames: x
-forward, y left, z up.
+Its arm says how it moves, see `weld`; under load it hangs back, as a servo would whose frequency
+and damping `python -m benchmarks.twins identify` finds from recorded motions. The table stops a
+hand that presses on it, softly, and brakes it: a fast one as Coulomb friction would; a slow one
+creeps, braked in proportion to its speed. Frames: x forward, y left, z up.
 """
 
 from dataclasses import dataclass
@@ -29,6 +26,7 @@ RESTING = 0.4195  # m, height of a hand that rests on the table
 # of a hand that presses on the table: loss of displacement along the table per lack of displacement
 # downwards where it slides, and the part that is lost where it creeps
 SLIDING, CREEPING = 0.95, 0.54
+SINKING = 0.11  # m that a hand on the table sinks per m of displacement that it lacks downwards
 
 # from the originals' model. Boxes of fingers are 1 mm larger: their contacts begin at that distance
 MARGIN = 1e-3  # m
@@ -41,8 +39,8 @@ FRICTION = 1.0
 FINGER = Servo((30e3 / 104.0) ** 0.5, 1e3 / (2.0 * (30e3 * 104.0) ** 0.5))
 FARTHEST = 0.2  # m, of a finger's set point
 
-# groups: the object, the hand, and the table that only the hand touches
-OBJECT, HAND, UNDER_HAND = 1, 2, 4
+# groups: the object and the table, and the hand; the arm knows the table under a hand
+OBJECT, HAND = 1, 2
 # contacts of the hand begin 1 mm below its fingers, not above them: half of it belongs to a length
 _OFFSET = np.array([0.0, 0.0, ABOVE_GRIP - 0.5 * MARGIN])
 _HALF_Z = HALF_LENGTH + 0.5 * MARGIN
@@ -76,7 +74,7 @@ class ClosedHand:
             mass=self.MASS, force_limit=1e6, position=tuple(self.start + _OFFSET),
             frequency=SERVO.frequency, damping_ratio=SERVO.damping,
             material=Material(FRICTION, restitution=0.0), name="hand",
-            group=HAND, mask=OBJECT | UNDER_HAND,
+            group=HAND, mask=OBJECT,
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
@@ -126,7 +124,7 @@ class OpenHand:
             position=tuple(self.start + _OFFSET), distance=2.0 * CLOSED,
             frequency=SERVO.frequency, damping_ratio=SERVO.damping,
             material=Material(FRICTION, restitution=0.0), name="hand",
-            group=HAND, mask=OBJECT | UNDER_HAND,
+            group=HAND, mask=OBJECT,
         )  # fmt: skip
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
@@ -185,6 +183,9 @@ def _follow(
     kept = braked(position[:, 2], moved)[:, None]
     moved[:, :2] *= kept
     end[:, :2] *= kept
+    below = np.maximum(RESTING - position[:, 2] - moved[:, 2], 0.0)
+    moved[:, 2] += (1.0 - SINKING) * below
+    end[:, 2] = np.where(below > 0.0, 0.0, end[:, 2])
     return SERVO.moving(frame, world.fidelity.substep, velocity, moved, end)
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from physics import Readout, Scene, World
+from physics import Ground, Material, Readout, Scene, World
 from rigid_envs.twins.fetch.arm import REACHING
-from rigid_envs.twins.fetch.hand import ClosedHand
-from rigid_envs.twins.fetch.task import FINGERS, FetchTask
+from rigid_envs.twins.fetch.hand import OBJECT, ClosedHand
+from rigid_envs.twins.fetch.task import FINGERS, TABLE, FetchTask
 from rigid_envs.twins.twin import along_axes, components
 
 Array = np.ndarray
@@ -28,7 +28,8 @@ class FetchReach(FetchTask):
 
     def scene(self) -> Scene:
         """The hand above the table."""
-        return Scene(bodies=[], statics=[self.table_under_hand()], drives=[self.hand.drive()])
+        table = Ground(Material(), TABLE, "table", OBJECT, OBJECT)
+        return Scene(bodies=[], statics=[table], drives=[self.hand.drive()])
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """The hand at its start."""

@@ -10,9 +10,7 @@ from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.fetch.hand import (
     ACTIONS,
-    HAND,
     OBJECT,
-    UNDER_HAND,
     ClosedHand,
     OpenHand,
 )
@@ -40,10 +38,6 @@ class FetchTask(Twin):
     hand: ClassVar[ClosedHand | OpenHand]
     actions = ACTIONS
     camera = CAMERA
-
-    def table_under_hand(self) -> Ground:
-        """The table as the hand meets it; `hand.braked` is its friction."""
-        return Ground(Material(0.0, 0.0), TABLE, "table under the hand", UNDER_HAND, HAND)
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis."""
@@ -91,11 +85,7 @@ class FetchObject(FetchTask):
     def scene(self) -> Scene:
         """The object on the table, and the hand above it."""
         table = Ground(Material(self.ground_friction, 0.0), self.ground, "table", OBJECT, OBJECT)
-        return Scene(
-            bodies=[self.object()],
-            statics=[table, self.table_under_hand()],
-            drives=[self.hand.drive()],
-        )
+        return Scene(bodies=[self.object()], statics=[table], drives=[self.hand.drive()])
 
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """The object at least 10 cm beside the hand."""

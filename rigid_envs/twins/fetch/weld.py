@@ -17,11 +17,12 @@ import numpy as np
 from physics.compiler.jit import LANES, sequence, stage
 from rigid_envs.twins.arms.chain import locate
 from rigid_envs.twins.arms.dynamics import answer
-from rigid_envs.twins.arms.linear import factor, invert, solve
+from rigid_envs.twins.arms.linear import factor, solve
 from rigid_envs.twins.arms.work import JOINTS
 
 SUBSTEPS, SUBSTEP = 20, 0.002  # in a step; s
 PIECES = 2  # of a step, for each of which the mass matrix is computed
+LOCATED = 5  # substeps after which the hand is located
 
 ROTOR = np.array([1.0, 1.0, 1.0, 1.0, 2.7538, 1.0, 1.0])  # kg m^2
 FRICTION = np.array([50.0, 50.0, 50.0, 50.0, 3.5247, 50.0, 50.0])  # N m s, of the dampers
@@ -40,16 +41,16 @@ RISE = 0.00306  # m/s
 
 @sequence
 def prepare(work):
-    """Inverts the mass matrices, and writes how the weld's point answers forces on it."""
-    M, weld, along, compliance = (
-        work.mass_matrix, work.matrix[1], work.matrix[2], work.matrix[3],
-    )  # fmt: skip
+    """Factors the mass matrices, and writes how the weld's point answers forces on it."""
+    weld, along, compliance = work.matrix[1], work.matrix[2], work.matrix[3]
     for kind in range(2):  # without dampers, and with them
+        factored = work.factored[kind]
         for i in range(JOINTS):
-            more = ROTOR[i] if kind == 0 else SUBSTEP * FRICTION[i]
-            for lane in range(LANES):
-                M[i, i, lane] += more
-        invert(M, work.inverse[kind], work.matrix[0], JOINTS)
+            more = ROTOR[i] + (SUBSTEP * FRICTION[i] if kind == 1 else 0.0)
+            for j in range(i + 1):
+                for lane in range(LANES):
+                    factored[i, j, lane] = work.mass_matrix[i, j, lane] + (more if i == j else 0.0)
+        factor(factored, JOINTS)
     J, rotation = work.jacobian, work.rotation[JOINTS]
     for i in range(JOINTS):  # the velocity of the weld's point, and half the angular velocity
         for lane in range(LANES):
@@ -61,7 +62,7 @@ def prepare(work):
             weld[1, i, lane] = J[1, i, lane] + dz * wx - dx * wz
             weld[2, i, lane] = J[2, i, lane] + dx * wy - dy * wx
             weld[3, i, lane], weld[4, i, lane], weld[5, i, lane] = 0.5 * wx, 0.5 * wy, 0.5 * wz
-    answer(weld, 6, work.inverse[0], along, compliance)
+    answer(weld, 6, work.factored[0], along, compliance)
 
 
 @stage
@@ -94,16 +95,27 @@ def aim(work):
 
 @sequence
 def pull(chain, work):
-    """The weld pulls the hand for a piece of a step."""
+    """The weld pulls the hand for a piece of a step.
+
+    Between substeps that locate the hand, errors follow from the Jacobian in the piece's middle.
+    """
     weld, along, compliance = work.matrix[1], work.matrix[2], work.matrix[3]
-    damped = work.inverse[1]
-    error, force, torque, system = work.vector[0], work.vector[1], work.vector[2], work.matrix[0]
-    angles, speeds, impedance = work.angles, work.speeds, work.vector[3, 0]
-    for _ in range(SUBSTEPS // PIECES):
-        locate(chain, angles, work)
+    damped = work.factored[1]
+    error, force, torque, rate = work.vector[0], work.vector[1], work.vector[2], work.vector[3]
+    angles, speeds, impedance, system = work.angles, work.speeds, work.vector[4, 0], work.matrix[0]
+    for substep in range(SUBSTEPS // PIECES):
         for lane in range(LANES):
             work.target[2, lane] -= SUBSTEP * RISE  # as seen from the torso
-        find_errors(work, error)
+        for a in range(6):
+            for lane in range(LANES):
+                total = RISE if a == 2 else 0.0
+                for i in range(JOINTS):
+                    total += weld[a, i, lane] * speeds[i, lane]
+                rate[a, lane] = total
+                error[a, lane] += SUBSTEP * total
+        if substep % LOCATED == 0:
+            locate(chain, angles, work)
+            find_errors(work, error)
         for i in range(JOINTS):
             spring = FOREARM_SPRING if i == FOREARM else 0.0
             for lane in range(LANES):
@@ -118,31 +130,26 @@ def pull(chain, work):
             part = 2.0 * x * x if x < 0.5 else 1.0 - 2.0 * (1.0 - x) * (1.0 - x)
             impedance[lane] = IMPEDANCE + (VIOLATED - IMPEDANCE) * part
         for a in range(6):
-            rise = RISE if a == 2 else 0.0
             for lane in range(LANES):
-                force[a, lane] = -SPRING * impedance[lane] * error[a, lane] - DAMPER * rise
+                force[a, lane] = -SPRING * impedance[lane] * error[a, lane] - DAMPER * rate[a, lane]
                 system[a, a, lane] = (
                     compliance[a, a, lane] + (1.0 / impedance[lane] - 1.0) * WEIGHT[a]
                 )
-            for i in range(JOINTS):
-                for lane in range(LANES):
-                    force[a, lane] -= (
-                        DAMPER * weld[a, i, lane] * speeds[i, lane]
-                        + along[a, i, lane] * torque[i, lane]
-                    )
+                for i in range(JOINTS):
+                    force[a, lane] -= along[a, i, lane] * torque[i, lane]
             for b in range(a):
                 for lane in range(LANES):
                     system[a, b, lane] = compliance[a, b, lane]
         factor(system, 6)
         solve(system, force, 6)
         for i in range(JOINTS):
-            for a in range(6):
-                for lane in range(LANES):
+            for lane in range(LANES):
+                for a in range(6):
                     torque[i, lane] += weld[a, i, lane] * force[a, lane]
+        solve(damped, torque, JOINTS)
         for i in range(JOINTS):
-            for j in range(JOINTS):
-                for lane in range(LANES):
-                    speeds[i, lane] += SUBSTEP * damped[i, j, lane] * torque[j, lane]
+            for lane in range(LANES):
+                speeds[i, lane] += SUBSTEP * torque[i, lane]
             for lane in range(LANES):
                 angles[i, lane] += SUBSTEP * speeds[i, lane]
 

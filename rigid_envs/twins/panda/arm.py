@@ -17,11 +17,9 @@ import numpy as np
 from physics.compiler.jit import entry
 from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write, write_part
 from rigid_envs.twins.arms.chain import Link, differentiate, locate, make_chain
-from rigid_envs.twins.arms.dynamics import weigh
-from rigid_envs.twins.arms.linear import invert
-from rigid_envs.twins.arms.work import JOINTS
+from rigid_envs.twins.arms.dynamics import factor_masses, weigh
 from rigid_envs.twins.panda.inverse_kinematics import solve_for_angles
-from rigid_envs.twins.panda.motors import PIECES, SUBSTEP, SUBSTEPS, drive, touch
+from rigid_envs.twins.panda.motors import PIECES, SUBSTEP, SUBSTEPS, begin, drive
 
 Array = np.ndarray
 
@@ -88,12 +86,13 @@ def _make_move() -> Any:
                     write_part(phase // 2 - 1, group, work, moved, end)
                     continue
                 weigh(chain, work)
-                invert(work.mass_matrix, work.inverse[0], work.matrix[0], JOINTS)
                 if middle:
-                    drive(work, touch(work))
+                    drive(work)
                 else:
+                    factor_masses(work)
                     hold_back(work)
                     solve_for_angles(chain, SUBSTEP, work)
+                    begin(work)
             write(start, group, work, hinges, load)
 
     return move

@@ -29,28 +29,20 @@ def _closed_fingers() -> tuple[Compound, float]:
     """The closed fingers, and how far their middle is above the end effector, m.
 
     Their mesh narrows towards the tip: along y from 25 mm at 27 mm above the end effector to 14 mm
-    at 7 mm below it. Two slanted boxes have these faces; a third one is above them.
+    at 7 mm below it. Two slanted boxes have these faces, and 6 mm more of them; there the mesh is
+    upright, which only the edge of a cube under the lowest hand could meet.
     """
-    (wide, high), (narrow, low), top = (0.0251, 0.027), (TIP_WIDTH, -0.007), 0.042
-    thick, depth = 0.006, 0.0097  # half of each, of a slanted box
+    (wide, high), (narrow, low) = (0.027, 0.033), (TIP_WIDTH, -0.007)
+    thick, depth = 0.006, 0.0097  # half of each, of a box
     slant = math.atan2(wide - narrow, high - low)
     length = math.hypot(wide - narrow, high - low)
     y = 0.5 * (wide + narrow) - thick * math.cos(slant)
-    z = 0.5 * (high + low) + thick * math.sin(slant)
-    above = Box((0.0105, wide, 0.5 * (top - high)))
     side = Box((depth, thick, 0.5 * length))
-    middle = (2.0 * side.volume * z + above.volume * 0.5 * (top + high)) / (
-        2.0 * side.volume + above.volume
-    )
     parts = [
-        Part(
-            side,
-            (0.0, s * y, z - middle),
-            (-s * math.sin(0.5 * slant), 0.0, 0.0, math.cos(0.5 * slant)),
-        )
+        Part(side, (0.0, s * y, 0.0), (-s * math.sin(0.5 * slant), 0.0, 0.0, math.cos(0.5 * slant)))
         for s in (1.0, -1.0)
     ]
-    return Compound([*parts, Part(above, (0.0, 0.0, 0.5 * (top + high) - middle))]), middle
+    return Compound(parts), 0.5 * (high + low) + thick * math.sin(slant)
 
 
 FINGERS, _MIDDLE = _closed_fingers()

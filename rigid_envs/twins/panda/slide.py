@@ -1,8 +1,10 @@
 """PandaSlide: the closed fingers hit a puck, which slides to a goal out of reach."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from physics import Body, Cylinder, Material, Readout, World
+from physics import Body, Cylinder, Drag, Material, Readout, Scene, World
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.panda.hand import HAND, OBJECT
 from rigid_envs.twins.panda.task import FRICTION, PandaObject, behind, observed
@@ -28,7 +30,6 @@ class PandaSlide(PandaObject):
     goal_height = 2.0 * HALF_HEIGHT
     goal_offset = 0.4
     solids = ((RADIUS, HALF_HEIGHT),)
-    table = (1.4, -0.1)
     shaping = {"aim": 10.0, "reach": 3.0, "time": -1.0}
 
     def bodies(self) -> list[Body]:
@@ -41,15 +42,9 @@ class PandaSlide(PandaObject):
             )
         ]  # fmt: skip
 
-    def act(self, world: World, now: Readout, actions: Array) -> None:
-        """Moves the hand by up to 5 cm along each axis; the puck's speed is damped."""
-        super().act(world, now, actions)
-        damp(world, now)
-
-    def proceed(self, world: World, part: int) -> None:
-        """Moves the hand on along its path; the puck's speed is damped."""
-        super().proceed(world, part)
-        damp(world, world.read())
+    def scene(self) -> Scene:
+        """The puck on the table, and the hand."""
+        return replace(super().scene(), fields=[Drag(linear=DAMPING * MASS, body="puck")])
 
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
@@ -70,8 +65,3 @@ class PandaSlide(PandaObject):
         reach = distance(self.hand.position(now), behind(achieved, desired))
         gone = achieved[:, 0] > REACH
         return {"aim": -miss, "reach": np.where(gone, 0.0, -reach)}
-
-
-def damp(world: World, now: Readout) -> None:
-    """Damps the puck's speed until the drives are commanded again."""
-    world.apply_wrench(-DAMPING * MASS * now.linear_velocity[:, 0], body="puck")

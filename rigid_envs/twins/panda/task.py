@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from physics import Body, Box, Ground, Material, Readout, Scene, Static, World
+from physics import Body, Box, Ground, Material, Readout, Scene, World
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
@@ -17,24 +17,21 @@ Array = np.ndarray
 LIMIT = 10.0  # of every component, as the original's spaces say; its values can be larger
 RANGE = 0.15  # m, largest offset of starts and goals from their middle along x and y
 HALF = 0.02  # m, half the width of a cube
-HALF_WIDTH, HEIGHT = 0.35, 0.4  # m, of the table
 FRICTION = 0.25  # Coulomb's coefficient of cubes and table
 
 
 class PandaTask(Twin):
-    """A hand over a table.
+    """A hand over a table, which has no edge.
 
     Attributes:
         hand: the hand.
         solids: half the width and half the height of each body, m.
-        table: length along x, and middle, m.
     """
 
     ends_on_success = True
     parts = ARM.parts
     hand: ClassVar[ClosedHand | OpenHand] = ClosedHand()
     solids: ClassVar[Solids] = ()
-    table: ClassVar[tuple[float, float]] = (1.1, -0.3)
     actions: tuple[str, ...] = ClosedHand.actions
     camera = Camera.around((0.0, 0.0, 0.04), 1.16, azimuth=-75.0, elevation=42.0)
 
@@ -44,14 +41,8 @@ class PandaTask(Twin):
 
     def scene(self) -> Scene:
         """The table, what lies on it, and the hand."""
-        material = Material(FRICTION, 0.0)
-        length, middle = self.table
-        table = Static(
-            Box((0.5 * length, HALF_WIDTH, 0.5 * HEIGHT)), (middle, 0.0, -0.5 * HEIGHT),
-            material=material, name="table", group=OBJECT, mask=OBJECT,
-        )  # fmt: skip
-        floor = Ground(material, -HEIGHT, "floor", OBJECT, OBJECT)
-        return Scene(bodies=self.bodies(), statics=[table, floor], drives=[self.hand.drive()])
+        table = Ground(Material(FRICTION, 0.0), 0.0, "table", OBJECT, OBJECT)
+        return Scene(bodies=self.bodies(), statics=[table], drives=[self.hand.drive()])
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis, as far as the arm gets."""

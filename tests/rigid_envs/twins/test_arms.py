@@ -9,8 +9,10 @@ from physics.compiler.jit import LANES
 from rigid_envs.twins import TWINS
 from rigid_envs.twins.arms.arm import hold_back, make_work
 from rigid_envs.twins.arms.chain import JOINTS, differentiate, locate
-from rigid_envs.twins.arms.dynamics import GRAVITY, weigh
-from rigid_envs.twins.arms.linear import factor, invert, solve
+from rigid_envs.twins.arms.dynamics import GRAVITY, factor_masses, weigh
+from rigid_envs.twins.arms.limits import limit_impulses
+from rigid_envs.twins.arms.linear import factor, solve
+from rigid_envs.twins.arms.work import ROWS
 from rigid_envs.twins.fetch import arm as fetch
 from rigid_envs.twins.panda import arm as panda
 from rigid_envs.twins.panda.hand import path
@@ -116,18 +118,42 @@ def test_the_bias_is_the_torque_that_lagranges_equations_give(chain):
         assert work.bias[:, 0] == pytest.approx(expected, abs=1e-4)
 
 
-def test_cholesky_solves_and_inverts():
+def test_cholesky_solves():
     rng = np.random.default_rng(0)
     roots = rng.normal(size=(JOINTS, 2 * JOINTS, LANES))
     matrix = np.einsum("ikl,jkl->ijl", roots, roots)
-    x, inverse, work = rng.normal(size=(JOINTS, LANES)), np.zeros_like(matrix), matrix.copy()
-    invert(matrix, inverse, np.zeros_like(matrix), JOINTS)
+    x, work = rng.normal(size=(JOINTS, LANES)), matrix.copy()
     factor(work, JOINTS)
     solved = x.copy()
     solve(work, solved, JOINTS)
     for lane in range(LANES):
-        assert inverse[..., lane] == pytest.approx(np.linalg.inv(matrix[..., lane]), rel=1e-9)
         assert solved[:, lane] == pytest.approx(np.linalg.solve(matrix[..., lane], x[:, lane]))
+
+
+@pytest.mark.parametrize("rows", [JOINTS, ROWS])
+def test_impulses_between_limits_give_each_row_what_it_lacks(rows):
+    """Or push it as far as its limit allows. Sides of one problem are the guess of the next."""
+    rng, at_limits = np.random.default_rng(0), 0
+    work = make_work()
+    roots = rng.normal(size=(rows, 2 * rows))
+    matrix = roots @ roots.T
+    work.system[:rows, :rows] = matrix
+    work.side[:] = -1.0
+    for _ in range(30):
+        work.low[:rows], work.high[:rows] = -rng.uniform(0.0, 0.1, (2, rows)) * ((1.0,), (-1.0,))
+        work.lack[:rows] = rng.normal(size=rows)
+        limit_impulses(work, rows)
+        low, high, x = work.low[:rows], work.high[:rows], work.impulse[:rows]
+        left = work.lack[:rows] - matrix @ x
+        assert work.gain[:rows] == pytest.approx(matrix @ x, abs=1e-9)
+        assert (x >= low - 1e-12).all()
+        assert (x <= high + 1e-12).all()
+        free = (x > low) & (x < high)
+        assert left[free] == pytest.approx(0.0, abs=1e-9)
+        assert (left[x == high] >= -1e-9).all()
+        assert (left[x == low] <= 1e-9).all()
+        at_limits += np.count_nonzero(~free)
+    assert 5 * rows < at_limits < 28 * rows
 
 
 @pytest.mark.parametrize("name", ["fetch_pick_and_place", "panda_pick_and_place"])
@@ -151,7 +177,7 @@ def test_hinges_follow_hands_that_are_held_back_as_they_would_follow_a_force(cha
         M, J = work.mass_matrix[:, :, 0], work.jacobian[:3, :, 0].copy()
         work.mass_matrix[:, :, 1:] = np.eye(JOINTS)[:, :, None]
         work.jacobian[:3, :, 1:] = np.eye(3, JOINTS)[:, :, None]
-        invert(work.mass_matrix, work.inverse[0], work.matrix[0], JOINTS)
+        factor_masses(work)
         held = work.origin[JOINTS, :, 0] + (1e-4, -2e-4, 1e-4)
         work.position[:, 0], work.velocity[:, 0] = held, (0.1, 0.2, 0.3)
         hold_back(work)
