@@ -222,6 +222,20 @@ class RigidEnv(gym.Env[Observation, Array]):
         """Threshold and weights of the reward. Reward wrappers read it."""
         return self._runner.reward
 
+    @property
+    def distance_threshold(self) -> float:
+        """Largest goal distance at which the task counts as solved; it can be set."""
+        return self.task.distance_threshold
+
+    @distance_threshold.setter
+    def distance_threshold(self, threshold: float) -> None:
+        self.task.distance_threshold = threshold
+
+    @property
+    def goal(self) -> Array:
+        """The desired goal [goal] of the episode; a copy."""
+        return self._runner.goals[0].copy()
+
     def compute_reward(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """The reward of pairs of goals, as HER needs it.
 

@@ -12,7 +12,7 @@ from physics import PRESETS
 from training.policies.policy_file import read_policy
 from training.policies.trained_policy import shipped_policy
 from training.results.result import read_results
-from training.results.results_page import by_kind, image_paths
+from training.results.results_tables import by_kind, image_paths
 from training.settings.environments import make_single_env, make_vector_env
 from training.settings.seed_ranges import EVALUATION
 

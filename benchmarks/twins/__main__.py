@@ -1,9 +1,9 @@
-"""python -m benchmarks.twins record | identify | compare | speed."""
+"""python -m benchmarks.twins record | identify | compare | speed | films | scripts."""
 
 import argparse
 from pathlib import Path
 
-from benchmarks.twins import identify, recordings, replay, speed
+from benchmarks.twins import films, identify, public_scripts, recordings, replay, speed
 from rigid_envs.twins import TWINS
 
 
@@ -11,10 +11,12 @@ def main() -> None:
     """Runs one of the commands."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.twins", description=__doc__)
     parser.add_argument(
-        "command", choices=("record", "identify", "compare", "speed"),
+        "command", choices=("record", "identify", "compare", "speed", "films", "scripts"),
         help="record: play scripts in the originals, and write what happened to data/; identify: "
-        "print what twins take from it; compare: print how far twins "
-        "differ from what was recorded; speed: steps per second beside the originals (3 min)",
+        "print what twins take from it; compare: print how far twins differ from what was "
+        "recorded; speed: steps per second beside the originals (5 min); films: draw recorded "
+        "policies in twins and originals; scripts: fetch public scripts and run them on twins "
+        "(15 min)",
     )  # fmt: skip
     parser.add_argument("--python", type=Path, help="interpreter that has the originals")
     options = parser.parse_args()
@@ -35,6 +37,11 @@ def main() -> None:
         sliding, creeping, gliding = identify.braking(slides)
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
               f"gliding {gliding:.3f} m/s")  # fmt: skip
+    elif options.command == "scripts":
+        for line in public_scripts.table():
+            print(line, flush=True)
+    elif options.command == "films":
+        films.draw(options.python)
     elif options.command == "speed":
         for row in speed.table(options.python):
             print(row, flush=True)

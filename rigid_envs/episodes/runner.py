@@ -21,7 +21,7 @@ from rigid_envs.episodes.pixels import Pixels, PixelSettings
 from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_terms
 from rigid_envs.tasks import Task
-from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, describe_info
+from rigid_envs.tasks.rewards import REWARD_TYPES, STEP_GOALS, Reward, describe_info
 
 Array = np.ndarray
 
@@ -106,8 +106,9 @@ class Runner:
         if not isinstance(terminate_on_success, bool | np.bool_):
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
-        reward = self.task.reward
-        self.reward = reward.with_time_penalty() if self.terminate_on_success else reward
+        self._rewards = self.task.reward, self.task.reward
+        if self.terminate_on_success:
+            self._rewards = self.task.reward, self.task.reward.with_time_penalty()
         self._has_task_terms = bool(self.reward.task_terms)
 
         self._observations = Observations(
@@ -299,6 +300,15 @@ class Runner:
     def goals(self) -> Array:
         """Desired goals [count, goal]."""
         return self._goals
+
+    @property
+    def reward(self) -> Reward:
+        """That of the task, which can be replaced, as these episodes use it."""
+        given = self.task.reward
+        if self._rewards[0] is not given:
+            ends = self.terminate_on_success
+            self._rewards = given, given.with_time_penalty() if ends else given
+        return self._rewards[1]
 
     def observe(self) -> tuple[Observation, dict[str, Array]]:
         """Observation, and info with entries [count].

@@ -87,7 +87,7 @@ class Reward:
                 reward ignores it.
 
         Returns:
-            Rewards [...]; a float for a single pair.
+            Rewards [...]; a NumPy float, which is a float, for a single pair.
 
         Raises:
             ValueError: the shapes of the goals differ; the dense reward finds no terms in the info,
@@ -105,7 +105,7 @@ class Reward:
             reward = self.sparse(success)
         else:
             reward = self.dense(success, goal_distance, self._terms(info, achieved, desired))
-        return float(reward) if achieved.ndim == 1 else reward
+        return np.float64(reward) if achieved.ndim == 1 else reward
 
     @property
     def task_terms(self) -> list[str]:

@@ -6,11 +6,13 @@ for all tasks.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from physics import Readout, Scene, SimulationDiverged, World
+from physics.scene.validation import number
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.rendering.view import Goal, Marker
 from rigid_envs.tasks.rewards import Reward
@@ -64,6 +66,16 @@ class Task(ABC):
     workspace: tuple[Point, Point] | None = None
     video_camera: str | None = None
     size_range: tuple[float, float] | None = None
+
+    @property
+    def distance_threshold(self) -> float:
+        """Largest goal distance at which the task counts as solved; it can be set."""
+        return self.reward.threshold
+
+    @distance_threshold.setter
+    def distance_threshold(self, threshold: float) -> None:
+        value = number("distance_threshold", threshold, low=0.0)
+        self.reward = replace(self.reward, threshold=value)
 
     @property
     def guide_bounds(self) -> Bounds:

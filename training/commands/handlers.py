@@ -74,7 +74,7 @@ def evaluate(options: argparse.Namespace) -> int:
 
         if kwargs:
             raise UsageError(f"--in has its own environment, which does not take {list(kwargs)}")
-        policy, result = evaluate_original(
+        policy, result, _ = evaluate_original(
             policy, options.original, options.n_episodes, seed=seed, python=options.python
         )
         evaluation.print_evaluation(policy, result)

@@ -27,6 +27,8 @@ MODULES = {"Fetch": "gymnasium_robotics", "Panda": "panda_gym"}
 
 def make(request: dict[str, Any]) -> list[Any]:
     """The environments of a request."""
+    if sys.platform == "linux" and "DISPLAY" not in os.environ:
+        os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo draws without a display
     import gymnasium as gym
 
     env_id = request["make"]

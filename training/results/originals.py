@@ -49,7 +49,7 @@ def evaluate_original(
     *,
     seed: int = EVALUATION,
     python: Path | None = None,
-) -> tuple[Policy, Evaluation]:
+) -> tuple[Policy, Evaluation, dict[str, str]]:
     """Plays episodes of a twin's policy in its original, with the seeds seed, seed + 1, ...
 
     Args:
@@ -60,7 +60,7 @@ def evaluate_original(
         python: See `Originals`.
 
     Returns:
-        The policy, for `env_id`, and the outcome.
+        The policy, for `env_id`, the outcome, and the versions of the packages there.
 
     Raises:
         UsageError: The policy is none of the twin of `env_id`, or the original can't run.
@@ -78,7 +78,7 @@ def evaluate_original(
     )
     seconds = time.perf_counter() - start
     result = Evaluation(at_end, at_any_time, returns, length, seconds, seed, None, {})
-    return replace(policy, env_id=env_id), result
+    return replace(policy, env_id=env_id), result, envs.description["versions"]
 
 
 def check_twin(policy: Policy, env_id: str) -> None:

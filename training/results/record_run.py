@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from rigid_envs.twins import TWINS
 from training.policies.export import export_run
+from training.policies.policy import Policy
 from training.policies.policy_header import Success
 from training.policies.trained_policy import trained_policy
 from training.results.evaluate import evaluate, wilson_interval
+from training.results.originals import evaluate_original
 from training.results.plot import read_learning_curve
 from training.results.result import RESULT, Result, parse_result, read_results
 from training.runs.run_folder import RunFolder
@@ -19,6 +22,7 @@ from training.sb3.model_state import read_state
 from training.settings.algorithms import SACConfig
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
+from training.settings.environments import task_of
 from training.settings.errors import UsageError
 from training.settings.seed_ranges import EVALUATION
 from training.settings.tasks import task_name
@@ -41,6 +45,8 @@ def record_run(
 ) -> Result:
     """Evaluates the policy of a finished run and writes its result atomically.
 
+    That of a twin is evaluated in its original, too.
+
     Args:
         folder: The run.
         repository: Folder that contains the folder of results.
@@ -50,7 +56,8 @@ def record_run(
 
     Raises:
         UsageError: The run is not finished or damaged, it or another run with its seed is recorded
-            already, its policy is too large, or the files cannot be written.
+            already, its policy is too large, the files cannot be written, or a twin's original
+            can't run.
     """
     config = folder.config()
     state, run, versions = _finished(folder), *_descriptions(folder)
@@ -66,6 +73,7 @@ def record_run(
     policy = trained_policy(folder.path)
     outcome = evaluate(policy, episodes, seed=EVALUATION, quiet=quiet)
     seconds, resumed = float(state["seconds"]), run.get("resumed", [])
+    original = _in_original(policy, episodes)
     values = {
         "algorithm": config.algo,
         "env_id": config.env_id,
@@ -84,6 +92,7 @@ def record_run(
         "resumed": len(resumed) if isinstance(resumed, list) else resumed,
         "started": run.get("started"),
         "versions": versions,
+        "original": original,
     }
     result = parse_result(values, str(folder.path))
     try:
@@ -91,6 +100,21 @@ def record_run(
     except OSError as error:
         raise UsageError(f"{result.folder(repository)} cannot be written: {error}") from None
     return result
+
+
+def _in_original(policy: Policy, episodes: int) -> dict[str, Any] | None:
+    """The evaluation of a twin's policy in its original, see `Result.original`; None of others."""
+    twin = TWINS.get(task_of(policy.env_id) or "")
+    if twin is None:
+        return None
+    there, outcome, versions = evaluate_original(policy, twin.original, episodes, seed=EVALUATION)
+    return {
+        "env_id": there.env_id,
+        "episodes": episodes,
+        "first_seed": EVALUATION,
+        "success_at_end": _rate(outcome.success_at_end),
+        "versions": versions,
+    }
 
 
 def _finished(folder: RunFolder) -> dict[str, Any]:

@@ -40,6 +40,21 @@ def _rate(value: Any) -> dict[str, float]:
     return found
 
 
+def _original(value: Any) -> dict[str, Any]:
+    """An evaluation of a twin's policy in its original."""
+    rules = {
+        "env_id": text,
+        "episodes": integer(1),
+        "first_seed": integer(0),
+        "success_at_end": _rate,
+        "versions": mapping(),
+    }
+    found: dict[str, Any] = mapping(rules)(value)
+    if set(found) != set(rules):
+        raise InvalidValue(f"a mapping of {', '.join(rules)}")
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class Result:
     """The outcome of a training run, and what is needed to repeat it."""
@@ -78,6 +93,9 @@ class Result:
     """Start of training, in UTC."""
     versions: dict[str, Any] = setting(mapping())
     """Versions of Python, platform and packages in training."""
+    original: dict[str, Any] | None = setting(optional(_original), None)
+    """Of a twin, the evaluation in its original: env_id, episodes, first_seed, success_at_end and
+    versions, those of the packages there."""
 
     @property
     def task(self) -> str:
@@ -109,7 +127,10 @@ class Result:
 
     def as_json(self) -> str:
         """The text of a file that `read_result` reads back to an equal result."""
-        return json.dumps(dataclasses.asdict(self), indent=2) + "\n"
+        values = dataclasses.asdict(self)
+        if self.original is None:
+            del values["original"]
+        return json.dumps(values, indent=2) + "\n"
 
 
 def read_result(file: Path) -> Result:
@@ -148,6 +169,8 @@ def parse_result(values: Any, source: str) -> Result:
     found: dict[str, Any] = {}
     for name, field in fields.items():
         if name not in values:
+            if field.default is not dataclasses.MISSING:
+                continue
             raise UsageError(f"{source}: {name} is missing")
         try:
             found[name] = field.metadata["rule"](values[name])

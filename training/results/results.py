@@ -8,7 +8,8 @@ from training.policies.policy_file import read_policy
 from training.results.plot import draw_learning_curves, read_curve
 from training.results.record_run import MAX_FILE_BYTES, record_run
 from training.results.result import Result, read_results
-from training.results.results_page import by_kind, image_paths, write_pages
+from training.results.results_page import write_pages
+from training.results.results_tables import by_kind, image_paths
 from training.results.video import record
 from training.runs.run_folder import RunFolder
 from training.settings.algorithms import ALGORITHMS

@@ -1,25 +1,30 @@
-"""Generates docs/results.md and the table in README.md from the recorded results alone."""
+"""Generates docs/results.md, and the tables in README.md and docs/twins.md, from the results."""
 
 import re
-import statistics
 from collections.abc import Callable, Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
 from training.results.result import Result, read_results
+from training.results.results_tables import (
+    by_kind,
+    image_paths,
+    over_seeds,
+    readme_table,
+    success_in_original,
+    twins_table,
+)
 from training.settings.algorithms import SACConfig
 from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.environment_ids import dense_id, plain_id
 from training.settings.errors import UsageError
-from training.settings.tasks import changed_arguments
 
 PAGE = Path("docs/results.md")
 README = Path("README.md")
-IMAGES = Path("docs/results")
+TWINS = Path("docs/twins.md")
 NONE_YET = "No run is recorded yet. `rigid-envs results` records the finished runs in `runs/`."
 HEAD = """\
 # Results
@@ -51,8 +56,6 @@ machine they give the same policy, otherwise a similar one.
 Intervals in parentheses are 95 % confidence intervals (Wilson). ± is the standard deviation over
 seeds.
 """
-README_IMAGE_WIDTH = 200
-"""Of an image in the README, in pixels."""
 _BLOCK = re.compile("(<!-- results -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
@@ -71,33 +74,39 @@ def page_text(results: Sequence[Result], repository: Path) -> str:
 def readme_text(text: str, results: Sequence[Result]) -> str:
     """The text of README.md, with the table of results between its two markers.
 
+    Twins are left out.
+
     Raises:
         UsageError: The text has no markers.
     """
+    own = [one for one in results if one.original is None]
+    return _with_block(README, text, readme_table(own) if own else f"{NONE_YET}\n")
+
+
+def twins_text(text: str, results: Sequence[Result]) -> str:
+    """The text of docs/twins.md, with the table of results of twins between its two markers.
+
+    Raises:
+        UsageError: The text has no markers.
+    """
+    twins = [one for one in results if one.original is not None]
+    return _with_block(TWINS, text, twins_table(twins) if twins else f"{NONE_YET}\n")
+
+
+def _with_block(path: Path, text: str, block: str) -> str:
     if not _BLOCK.search(text):
-        raise UsageError(f"{README} has no lines <!-- results --> and <!-- /results -->")
-    block = _summary(results) if results else f"{NONE_YET}\n"
+        raise UsageError(f"{path} has no lines <!-- results --> and <!-- /results -->")
     return _BLOCK.sub(lambda found: found[1] + block + found[2], text)
 
 
-def by_kind(results: Sequence[Result]) -> list[list[Result]]:
-    """Groups the results that differ only in their seed."""
-    return [list(group) for _, group in groupby(results, key=lambda result: result.kind)]
-
-
-def image_paths(kind: str) -> tuple[Path, Path]:
-    """Paths in the repository of the learning curve and the video of a kind."""
-    return IMAGES / f"{kind}.png", IMAGES / f"{kind}.gif"
-
-
 def write_pages(repository: Path) -> list[Path]:
-    """Updates the page and the README.
+    """Updates the page, the README and the page of twins.
 
     Returns:
         The files that have changed.
 
     Raises:
-        UsageError: A result is damaged, or the README has no markers.
+        UsageError: A result is damaged, or the README or the page of twins has no markers.
     """
     written = []
     for path, text in _expected(repository).items():
@@ -110,7 +119,7 @@ def write_pages(repository: Path) -> list[Path]:
 
 
 def check_pages(repository: Path) -> None:
-    """Raises UsageError if the page or the README is out of date, or a file is missing."""
+    """Raises UsageError if one of these pages is out of date, or a file is missing."""
     for path, text in _expected(repository).items():
         file = repository / path
         if not file.exists() or file.read_text(encoding="utf-8") != text:
@@ -124,41 +133,46 @@ def check_pages(repository: Path) -> None:
 
 
 def _expected(repository: Path) -> dict[Path, str]:
-    """Text of the page and of the README, by their path in the repository."""
+    """Text of the page, of the README and of the page of twins, by path in the repository."""
     results = read_results(repository)
-    try:
-        readme = (repository / README).read_text(encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{repository / README} cannot be read: {error.strerror}") from None
-    return {PAGE: page_text(results, repository), README: readme_text(readme, results)}
+    found = {PAGE: page_text(results, repository)}
+    for path, text in ((README, readme_text), (TWINS, twins_text)):
+        try:
+            found[path] = text((repository / path).read_text(encoding="utf-8"), results)
+        except OSError as error:
+            raise UsageError(f"{repository / path} cannot be read: {error.strerror}") from None
+    return found
 
 
 def _section(group: Sequence[Result], settings: TrainConfig) -> str:
     """The section of a kind: its table, commands and images."""
     first = group[0]
+    there = "" if first.original is None else f" in {first.original['env_id']} |"
     lines = [
         f"## {first.title}",
         "",
         _environment(first) + _first_stage(first, settings),
         "",
         "| seed | steps | wall time | in environments "
-        "| success at the end | at any time | commit |",
-        "|---:|---:|---:|---:|---:|---:|---|",
+        f"| success at the end | at any time |{there} commit |",
+        f"|---:|---:|---:|---:|---:|---:|{'---:|' if there else ''}---|",
     ]
     for one in group:
+        original = f" {_interval(one.original['success_at_end'])} |" if one.original else ""
         lines.append(
             f"| {one.seed} | {one.steps:,} | {one.seconds:.0f} s | "
             f"{100 * one.environment_time_fraction:.0f} % | "
-            f"{_interval(one.success_at_end)} | {_interval(one.success_at_any_time)} | "
+            f"{_interval(one.success_at_end)} | {_interval(one.success_at_any_time)} |{original} "
             f"{_short(one.commit)} |"
         )
     if len(group) > 1:
         cells = [
-            _over_seeds(group, lambda one: one.steps, "{:,.0f}"),
-            _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
-            _over_seeds(group, lambda one: 100 * one.environment_time_fraction, "{:.0f}", " %"),
-            _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
-            _over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
+            over_seeds(group, lambda one: one.steps, "{:,.0f}"),
+            over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
+            over_seeds(group, lambda one: 100 * one.environment_time_fraction, "{:.0f}", " %"),
+            over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
+            over_seeds(group, lambda one: 100 * one.success_at_any_time["rate"], "{:.1f}", " %"),
+            *([over_seeds(group, success_in_original, "{:.1f}", " %")] if there else []),
         ]
         lines.append(f"| mean | {' | '.join(cells)} | |")
     lines += ["", "```sh", *(one.command for one in group), "```", ""]
@@ -230,62 +244,6 @@ def _versions(one: Result) -> str:
     return f"Trained with {', '.join(f'{name} {value}' for name, value in versions.items())}."
 
 
-def _summary(results: Sequence[Result]) -> str:
-    """The table in the README: sizes, and results by algorithm, of environments as registered."""
-    results = [one for one in results if not changed_arguments(one.env_id, one.arguments)]
-    algorithms = list(dict.fromkeys(one.algorithm for one in results))
-    columns = ["environment", "", "observation", "action", "steps per episode"]
-    for algorithm in algorithms:
-        columns += [f"{algorithm.upper()}: success", "training time"]
-    lines = [" | ".join(columns), " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])]
-    environments: dict[str, list[list[Result]]] = {}
-    for group in by_kind(results):
-        environments.setdefault(_task_key(group[0]), []).append(group)
-    for groups in environments.values():
-        first = groups[0][0]
-        cells = [_names(first), _image(first), *_sizes(first.env_id)]
-        by_algorithm = {group[0].algorithm: group for group in groups}
-        for algorithm in algorithms:
-            cells += _outcome(by_algorithm.get(algorithm, []))
-        lines.append(" | ".join(cells))
-    return "\n".join([*(f"| {line} |" for line in lines), ""])
-
-
-def _task_key(one: Result) -> str:
-    """A key that is the same for the sparse and the dense id of a task."""
-    return str(gym.spec(one.env_id).kwargs.get("task", one.env_id))
-
-
-def _names(one: Result) -> str:
-    """The registered ids of a task, sparse and dense."""
-    ids = [name for name in (plain_id(one.env_id), dense_id(one.env_id)) if name in gym.registry]
-    return "<br>".join(ids)
-
-
-def _image(one: Result) -> str:
-    video = image_paths(one.kind)[1].as_posix()
-    return f'<img src="{video}" width="{README_IMAGE_WIDTH}" alt="{one.env_id}">'
-
-
-def _sizes(env_id: str) -> list[str]:
-    """Sizes of observation and action, and the steps of an episode."""
-    env = gym.make(env_id)
-    spaces: Any = env.observation_space, env.action_space
-    env.close()
-    observation, action = spaces[0]["observation"].shape[0], spaces[1].shape[0]
-    return [str(observation), str(action), str(gym.spec(env_id).max_episode_steps)]
-
-
-def _outcome(group: Sequence[Result]) -> list[str]:
-    """Success at the end and training time of runs that differ by their seed; of none, dashes."""
-    if not group:
-        return ["–", "–"]
-    success = _over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %")
-    if statistics.fmean(one.seconds for one in group) < 100:
-        return [success, _over_seeds(group, lambda one: one.seconds, "{:.0f}", " s")]
-    return [success, _over_seeds(group, lambda one: one.seconds / 60, "{:.1f}", " min")]
-
-
 def _short(commit: str | None) -> str:
     if commit is None:
         return "–"
@@ -296,14 +254,3 @@ def _short(commit: str | None) -> str:
 def _interval(rate: dict[str, float]) -> str:
     low, middle, high = (f"{100 * rate[name]:.1f}" for name in ("low", "rate", "high"))
     return f"{middle} % ({low} to {high})"
-
-
-def _over_seeds(
-    group: Sequence[Result], value: Callable[[Result], float], form: str, unit: str = ""
-) -> str:
-    """Mean ± standard deviation over seeds; the value alone for a single seed."""
-    values = [value(one) for one in group]
-    mean = form.format(statistics.fmean(values))
-    if len(values) == 1:
-        return f"{mean}{unit}"
-    return f"{mean} ± {form.format(statistics.stdev(values))}{unit}"

@@ -119,3 +119,25 @@ def test_worlds_of_a_vector_environment_are_single_environments(twin):
         assert np.array_equal(values, many[key][2]), key
     assert many["observation"].dtype == twin.dtype
     envs.close()
+
+
+@pytest.mark.parametrize("name", ["FetchPush", "PandaPush"])
+def test_attributes_that_scripts_read_and_set(name):
+    """As scripts for the originals do: the threshold counts from then on."""
+    env = gym.make(f"RigidEnvs/{name}-v0").unwrapped
+    observation, _ = env.reset(seed=0)
+    np.testing.assert_array_equal(env.goal, observation["desired_goal"])
+    assert env.distance_threshold == env.task.distance_threshold == 0.05
+    goal = np.zeros(3)
+    reward = env.compute_reward(np.array([0.03, 0.0, 0.0]), goal, {})
+    assert (reward == 0).astype(np.float32) == 1.0
+    env.task.distance_threshold = 0.01
+    assert env.distance_threshold == 0.01
+    assert env.compute_reward(np.array([0.03, 0.0, 0.0]), goal, {}) == -1.0
+    env.distance_threshold = 10.0
+    _, reward, terminated, _, info = env.step(env.action_space.sample())
+    assert reward == 0.0
+    assert info["is_success"]
+    assert terminated == (name == "PandaPush")
+    with pytest.raises(ValueError, match=r"distance_threshold must be .*, got -1"):
+        env.distance_threshold = -1.0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from training.results.results_page import README
+from training.results.results_page import README, TWINS
 from training.sb3.train import train
 from training.settings.config import TrainConfig
 
@@ -16,7 +16,8 @@ def repository(tmp_path) -> Path:
     """A clone without results."""
     (tmp_path / "clone" / "docs").mkdir(parents=True)
     text = "# name\n<!-- results -->\nold\n<!-- /results -->\nmore\n"
-    (tmp_path / "clone" / README).write_text(text)
+    for page in (README, TWINS):
+        (tmp_path / "clone" / page).write_text(text)
     return tmp_path / "clone"
 
 

@@ -22,7 +22,7 @@ import json, sys
 for line in sys.stdin:
     request = json.loads(line)
     if "make" in request:
-        reply = {"spaces": {}, "max_episode_steps": 5, "versions": {}}
+        reply = {"spaces": {}, "max_episode_steps": 5, "versions": {"mujoco": "3"}}
     else:
         if "reset" in request:
             seeds, step = request["reset"], 0
@@ -57,10 +57,11 @@ def test_episodes_are_counted_as_at_home(tmp_path, monkeypatch):
     worker.write_text(WORKER)
     monkeypatch.setattr(originals, "WORKER", worker)
     monkeypatch.setattr(originals, "WORLDS", 3)
-    policy, result = evaluate_original(POLICY, "FetchReach-v4", 20, seed=7)
+    policy, result, versions = evaluate_original(POLICY, "FetchReach-v4", 20, seed=7)
     assert policy.env_id == "FetchReach-v4"
     assert result.success_at_end.tolist() == [seed % 2 == 0 for seed in range(7, 27)]
     assert result.length.tolist() == [5] * 20
+    assert versions == {"mujoco": "3"}
     assert result.episode_return == pytest.approx(np.full(20, -2.5))
 
 

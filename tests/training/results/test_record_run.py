@@ -3,13 +3,16 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.training.results.recorded import PLACE, change, update
+from training.policies.policy import Policy
 from training.policies.policy_file import load_policy_file, read_policy
-from training.results.evaluate import evaluate
-from training.results.record_run import ROWS, _command
+from training.results.evaluate import Evaluation, evaluate
+from training.results.record_run import ROWS, _command, _in_original
 from training.results.result import read_result, read_results
 from training.results.results_page import check_pages
 from training.runs.run_folder import RunFolder
@@ -19,10 +22,27 @@ from training.settings.errors import UsageError
 from training.settings.seed_ranges import EVALUATION
 
 
+def test_a_twins_policy_is_evaluated_in_its_original(monkeypatch):
+    outcome = Evaluation(*np.zeros((4, 10)), 1.0, EVALUATION, None, {})
+    outcome.success_at_end[:3] = 1.0
+
+    def play(policy, env_id, episodes, *, seed):
+        assert (env_id, episodes, seed) == ("PandaPush-v3", 10, EVALUATION)
+        return replace(policy, env_id=env_id), outcome, {"pybullet": "3.2.7"}
+
+    monkeypatch.setattr("training.results.record_run.evaluate_original", play)
+    policy = Policy(lambda observation: np.zeros((1, 3)), "RigidEnvs/PandaPushDense-v0", "still")
+    found = _in_original(policy, 10)
+    assert found["env_id"] == "PandaPush-v3"
+    assert found["versions"] == {"pybullet": "3.2.7"}
+    assert found["success_at_end"]["rate"] == 0.3
+    assert _in_original(replace(policy, env_id="RigidEnvs/Push-v0"), 10) is None
+
+
 def test_result_contains_what_is_needed_to_judge_and_repeat_the_run(repository, runs, reach):
     lines = update(repository, log_folder=runs)
     verbs = [line.split()[0] for line in lines]
-    assert verbs == ["recorded", "recorded", "plotted", "video", "written", "written"]
+    assert verbs == ["recorded", "recorded", "plotted", "video", *["written"] * 3]
     place = repository / PLACE
     assert {file.name for file in place.iterdir()} == {
         "result.json",

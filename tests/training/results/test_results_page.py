@@ -1,13 +1,14 @@
 """The page of results and the table of the README: generated from the results alone."""
 
 import dataclasses
+import json
 
 import pytest
 from PIL import Image
 
 from tests.training.results.recorded import PLACE, update
 from training.commands import cli
-from training.results.result import read_results
+from training.results.result import parse_result, read_results
 from training.results.results import SOURCE
 from training.results.results_page import (
     README,
@@ -15,6 +16,7 @@ from training.results.results_page import (
     check_pages,
     page_text,
     readme_text,
+    twins_text,
 )
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
@@ -72,9 +74,40 @@ def test_a_task_with_other_arguments_has_its_own_section_and_no_row_in_the_readm
     assert tables[0] == tables[1]
 
 
+def test_twins_have_their_own_table_with_success_in_their_originals():
+    given = next(r for r in read_results(SOURCE) if r.kind == "ppo-RigidEnvs-Push-v0")
+    rates = [{"low": rate - 0.02, "rate": rate, "high": rate + 0.01} for rate in (0.9, 0.96)]
+    twins = [
+        dataclasses.replace(
+            given, env_id="RigidEnvs/FetchPush-v0", seed=seed, steps=1_000_000,
+            original={"env_id": "FetchPush-v4", "episodes": 1000, "first_seed": 0,
+                      "success_at_end": rate, "versions": {"mujoco": "3.2.7"}},
+        )
+        for seed, rate in enumerate(rates)
+    ]  # fmt: skip
+    empty = "<!-- results -->\n<!-- /results -->\n"
+    assert "No run is recorded" in readme_text(empty, twins)
+    assert readme_text(empty, [given, *twins]) == readme_text(empty, [given])
+    assert "No run is recorded" in twins_text(empty, [given])
+    table = twins_text(empty, [given, *twins])
+    assert "\n| FetchPush | 2 | 1 M | " in table
+    assert table.splitlines()[-2].endswith("| 93.0 ± 4.2 % | 90.0 % |")
+    section = _section(twins, load_config("ppo", given.env_id))
+    assert "| at any time | in FetchPush-v4 | commit |" in section
+    assert "| 90.0 % (88.0 to 91.0) |" in section
+    assert "| 93.0 ± 4.2 % | |" in section
+    for one in (given, *twins):  # results without an original keep their files
+        assert parse_result(json.loads(one.as_json()), "file") == one
+    assert "original" not in given.as_json()
+    with pytest.raises(
+        UsageError, match=r"original is .*, should be a mapping of env_id, episodes"
+    ):
+        parse_result({**json.loads(given.as_json()), "original": {"episodes": 3}}, "file")
+
+
 def test_pages_without_results(repository, tmp_path):
     lines = update(repository, log_folder=tmp_path / "nowhere")
-    assert lines == ["written  docs/results.md", "written  README.md"]
+    assert lines == ["written  docs/results.md", "written  README.md", "written  docs/twins.md"]
     assert "No run is recorded yet" in (repository / "docs/results.md").read_text()
     assert "No run is recorded yet" in (repository / README).read_text()
     assert update(repository, log_folder=tmp_path / "nowhere") == []
