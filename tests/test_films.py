@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks import plots
 from benchmarks.draw import tasks, worlds
+from benchmarks.twins import films as twin_films
 from physics import PRESETS
 from training.policies.policy_file import read_policy
 from training.policies.trained_policy import shipped_policy
@@ -31,6 +32,7 @@ def test_a_command_draws_every_picture():
     drawn |= {plots.FILM, plots.WORLDS, plots.SCENES, plots.PIXELS, plots.VIEW}
     drawn |= {ROOT / f"docs/images/{name}.png" for name in tasks.STRIPS}
     drawn |= {ROOT / path for kind in KINDS for path in image_paths(kind[0].kind)}
+    drawn |= {twin_films.path(name) for name in twin_films.FILMED}
     # by benchmarks.stability
     drawn |= {ROOT / f"docs/trade/stability_{name}.png" for name in PRESETS}
     found = {path for path in (ROOT / "docs").rglob("*") if path.suffix in (".png", ".gif")}

@@ -16,13 +16,14 @@ from training.policies.policy import Policy
 from training.policies.policy_file import read_policy
 from training.results.gif import GifWriter
 from training.results.originals import Originals
+from training.results.result import read_results
 from training.results.video import film_episode
 from training.settings.environments import task_of
 
 Array = np.ndarray
 
 ROOT = Path(__file__).parents[2]
-FILMED = ("FetchPush", "FetchPickAndPlace", "PandaPush", "PandaPickAndPlace")
+FILMED = ("FetchPush", "PandaPush", "PandaPickAndPlace")
 SEEDS = (1_000_000, 1_000_001, 1_000_002)  # the first of every evaluation
 HEIGHT, FPS = 240, 25  # pixels of a frame; of the originals' steps of 40 ms
 AFTER = 10  # frames that are shown after the goal is met
@@ -34,10 +35,10 @@ def path(name: str) -> Path:
 
 
 def draw(python: Path | None = None, names: Sequence[str] = FILMED) -> None:
-    """Films recorded policies."""
+    """Films the first recorded policy of each twin."""
     for name in names:
-        file = ROOT / f"results/ppo/RigidEnvs-{name}-v0_seed0/policy.safetensors"
-        film(read_policy(file), path(name), python)
+        result = next(one for one in read_results(ROOT) if one.env_id == f"RigidEnvs/{name}-v0")
+        film(read_policy(result.folder(ROOT) / "policy.safetensors"), path(name), python)
 
 
 def film(policy: Policy, gif: Path, python: Path | None = None) -> None:
