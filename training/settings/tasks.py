@@ -13,7 +13,7 @@ from training.settings.environment_ids import folder_name, plain_id
 from training.settings.errors import UsageError
 
 SAME_TASK = (
-    "reward_type", "fidelity", "observe_task_guide",
+    "reward_type", "shaped", "fidelity", "observe_task_guide",
     "pixel_size", "camera", "width", "height", "show_forces", "show_particles", "render_worlds",
     "threads",
 )  # fmt: skip
