@@ -246,7 +246,7 @@ class RigidEnv(gym.Env[Observation, Array]):
                 reward ignores it.
 
         Returns:
-            Rewards [...]; a float for a single pair.
+            Rewards [...]; a NumPy float for a single pair.
 
         Raises:
             ValueError: with the dense reward, other goals than those of the step, or no info.

@@ -47,11 +47,12 @@ def solved(policy, seed, steps=None, **arguments):
         arguments["max_episode_steps"] = steps
     with closing(make_single_env(policy.env_id, **{**policy.env_kwargs, **arguments})) as env:
         observation, _ = env.reset(seed=seed)
-        truncated = False
-        while not truncated:
+        ended = False
+        while not ended:
             batch = {name: np.asarray(value)[None] for name, value in observation.items()}
             action = np.asarray(policy.act(batch))[0].astype(np.float32)
-            observation, _, _, truncated, info = env.step(action)
+            observation, _, terminated, truncated, info = env.step(action)
+            ended = terminated or truncated
     return info["is_success"]
 
 

@@ -147,7 +147,7 @@ class RuleWrapper:
                 the reward follows from the goals.
 
         Returns:
-            Rewards [...]; a float for a single pair.
+            Rewards [...]; a NumPy float for a single pair.
 
         Raises:
             ValueError: the reward does not follow from these goals and this info.
@@ -157,7 +157,7 @@ class RuleWrapper:
         terms = self._terms_from(info, join_goals(achieved, desired))
         goals = Goals(achieved, desired, self._reward)
         reward, _ = self.rule.apply(np.asarray(reward), goals, terms)
-        return float(reward) if achieved.ndim == 1 else reward
+        return np.float64(reward) if achieved.ndim == 1 else reward
 
     def compute_terminated(self, achieved_goal: Array, desired_goal: Array, info: Any) -> Any:
         """`compute_terminated` of the wrapped environment: wrappers do not change it."""

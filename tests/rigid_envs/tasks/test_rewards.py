@@ -76,9 +76,14 @@ def test_rewards_are_vectorised_over_leading_axes(kind, shape):
         assert rewards[index] == REWARD.compute(kind, achieved[index], desired[index], info)
 
 
-def test_the_reward_of_one_pair_of_goals_is_a_python_float():
-    assert type(REWARD.compute("sparse", ORIGIN, ORIGIN, {})) is float
-    assert type(REWARD.compute("dense", ORIGIN, ORIGIN, info_of(ORIGIN, ORIGIN, 0.0))) is float
+def test_the_reward_of_one_pair_of_goals_is_a_float_of_numpy():
+    """It is a Python float, and has the methods of arrays, which scripts call."""
+    for reward in (
+        REWARD.compute("sparse", ORIGIN, ORIGIN, {}),
+        REWARD.compute("dense", ORIGIN, ORIGIN, info_of(ORIGIN, ORIGIN, 0.0)),
+    ):
+        assert isinstance(reward, float)
+        assert isinstance(reward, np.float64)
 
 
 @pytest.mark.parametrize("info", [None, {}, [{}] * 7, np.array([{}] * 7), {"reach": np.nan}])

@@ -79,7 +79,7 @@ def test_rewards_of_goals_are_vectorised_over_leading_axes(name):
     pairs = random.uniform(-0.06, 0.06, (2, 4, 5, 3)).astype(np.float32)
     rewards = env.compute_reward(*pairs, {})
     assert rewards.shape == (4, 5)
-    assert type(env.compute_reward(*pairs[:, 0, 0], {})) is float
+    assert type(env.compute_reward(*pairs[:, 0, 0], {})) is np.float64
     for i in np.ndindex(4, 5):
         assert rewards[i] == env.compute_reward(pairs[0][i], pairs[1][i], {})
 

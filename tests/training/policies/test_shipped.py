@@ -29,7 +29,7 @@ def test_each_task_has_one(env_id):
 
 def test_another_environment_has_none_and_the_message_says_which_do():
     with pytest.raises(
-        UsageError, match=r"comes with the package; there are RigidEnvs/PickAndPlace-v0, "
+        UsageError, match=r"comes with the package; there are .*RigidEnvs/PickAndPlace-v0, "
     ) as e:
         shipped_policy("RigidEnvs/Pull-v0")
     for env_id in str(e.value).partition("there are ")[2].split(", "):

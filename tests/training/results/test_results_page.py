@@ -45,7 +45,7 @@ def test_page_and_readme_show_every_seed_and_the_mean(repository, runs):
 
 
 def test_pages_name_both_ids_of_a_dense_environment():
-    results = [result for result in read_results(SOURCE) if "Push" in result.env_id]
+    results = [result for result in read_results(SOURCE) if "RigidEnvs/Push-" in result.env_id]
     dense = next(result for result in results if result.algorithm == "ppo")
     by_dense_id = dataclasses.replace(dense, env_id="RigidEnvs/PushDense-v0")
     for result in (dense, by_dense_id):
