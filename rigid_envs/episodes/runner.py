@@ -106,9 +106,7 @@ class Runner:
         if not isinstance(terminate_on_success, bool | np.bool_):
             raise TypeError(f"terminate_on_success must be a bool, got {terminate_on_success!r}")
         self.terminate_on_success = bool(terminate_on_success)
-        self._rewards = self.task.reward, self.task.reward
-        if self.terminate_on_success:
-            self._rewards = self.task.reward, self.task.reward.with_time_penalty()
+        self._rewards: tuple[Reward | None, Reward] = None, self.task.reward  # see `reward`
         self._has_task_terms = bool(self.reward.task_terms)
 
         self._observations = Observations(
