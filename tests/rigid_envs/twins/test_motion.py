@@ -8,11 +8,16 @@ from benchmarks.twins.recordings import Recording
 from benchmarks.twins.replay import OBJECT, body_errors, hand_errors, replay
 from physics import Box, Drive, Scene, World
 from rigid_envs.twins import TWINS
+from rigid_envs.twins.arms.arm import make_work
+from rigid_envs.twins.arms.chain import locate
+from rigid_envs.twins.arms.work import JOINTS
 from rigid_envs.twins.fetch.hand import CREEPING as HAND_CREEPING
 from rigid_envs.twins.fetch.hand import RESTING, braked
 from rigid_envs.twins.fetch.hand import SLIDING as HAND_SLIDING
 from rigid_envs.twins.fetch.slide import CREEPING, GLIDING, SLIDING, braking, predicted
 from rigid_envs.twins.fetch.task import rotation as fetch_rotation
+from rigid_envs.twins.panda import inverse_kinematics
+from rigid_envs.twins.panda.arm import CHAIN, NEUTRAL
 from rigid_envs.twins.panda.task import rotation as panda_rotation
 from rigid_envs.twins.servo import Servo
 
@@ -158,3 +163,21 @@ def test_starts_around_the_object_are_for_training_only():
         assert np.abs(offsets[1]).max() < 0.031
     with pytest.raises(ValueError, match="near_grasp_start_prob"):
         TWINS["panda_stack"](near_grasp_start_prob=2.0)
+
+
+def test_six_jacobians_lead_the_panda_where_twenty_do(monkeypatch):
+    """Inverse kinematics: within 0.3 mm, of 5 cm and less that are asked for along each axis."""
+    rng, aims = np.random.default_rng(0), []
+    work = make_work()
+    asked = rng.uniform(-0.05, 0.05, work.asked.shape)
+    for iterations in (inverse_kinematics.ITERATIONS, (1,) * 20):
+        monkeypatch.setattr(inverse_kinematics, "ITERATIONS", iterations)
+        work.angles[:] = NEUTRAL[:, None]
+        locate(CHAIN, work.angles, work)
+        work.position[:], work.asked[:] = work.origin[JOINTS], asked
+        inverse_kinematics.solve_for_angles(CHAIN, 0.0, work)
+        locate(CHAIN, work.aim, work)
+        aims.append(work.origin[JOINTS].copy())
+    assert sum(inverse_kinematics.ITERATIONS) == 20
+    assert np.linalg.norm(aims[0] - aims[1], axis=0).max() < 3e-4
+    assert np.linalg.norm(aims[1] - work.position, axis=0).min() > 1e-3
