@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from stable_baselines3.sac.policies import SACPolicy
 
 from training.policies.bounded import BoundedPolicy
+from training.policies.features.symlog_features import SymlogOffsets
 from training.policies.offsets import GoalOffsets
 from training.policies.pixels import SHARPNESS, KeypointFeatures
 from training.policies.policy_file import SUFFIX, PolicyFile, load_policy_file
@@ -26,7 +27,6 @@ from training.policies.policy_header import (
     Normalization,
     Success,
 )
-from training.policies.symlog_features import SymlogOffsets
 from training.runs.run_folder import RunFolder, atomic_write, git_commit, package_versions
 from training.settings.config import TrainConfig
 from training.settings.errors import UsageError
@@ -96,7 +96,7 @@ def policy_file_of(
     shapes = {key: tuple(one.shape or ()) for key, one in space.spaces.items()}
     filters: list[tuple[np.ndarray, np.ndarray]] = []
     points = None
-    extractor: Any = model.policy.features_extractor
+    extractor = _features_extractor(model)
     if isinstance(extractor, KeypointFeatures):
         filters, points = _keypoints(extractor)
         channels, height, width = shapes["observation"]  # as the network has it
@@ -122,6 +122,7 @@ def policy_file_of(
             high=[float(x) for x in actions.high.flatten()],
             features=features,
             keypoints=points,
+            next_object=extractor.objects if isinstance(extractor, SymlogOffsets) else None,
         ),
         normalization=scaling,
         success=success,
@@ -140,17 +141,24 @@ def _squashing(policy: Any) -> str:
     return "tanh" if isinstance(policy, SACPolicy) else "clip"
 
 
+def _features_extractor(model: BaseAlgorithm) -> Any:
+    """The actor's."""
+    policy: Any = model.policy
+    if isinstance(model, SAC):
+        return policy.actor.features_extractor
+    return policy.pi_features_extractor
+
+
 def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], str, str]:
     """The actor's weights and biases by layer, and the names of activation and features."""
     policy: Any = model.policy
     if isinstance(model, PPO):
-        extractor = policy.pi_features_extractor
         modules = [*policy.mlp_extractor.policy_net, policy.action_net]
     elif isinstance(model, SAC):
-        extractor = policy.actor.features_extractor
         modules = [*policy.actor.latent_pi, policy.actor.mu]
     else:
         raise UsageError(f"policy files support PPO and SAC, not {type(model).__name__}")
+    extractor = _features_extractor(model)
     between = [module for module in modules if not isinstance(module, torch.nn.Linear)]
     kinds = {type(module) for module in between}
     own = isinstance(extractor, GoalOffsets | SymlogOffsets | KeypointFeatures)
@@ -173,8 +181,10 @@ def _layers(model: BaseAlgorithm) -> tuple[list[tuple[np.ndarray, np.ndarray]], 
     if isinstance(extractor, KeypointFeatures):  # factors of the features: merge them likewise
         layers[0] = (layers[0][0] * _numbers(extractor.factors), layers[0][1])
     if isinstance(extractor, SymlogOffsets):
-        matrix = _numbers(extractor.matrix)
-        layers.insert(0, (matrix, np.zeros(len(matrix), np.float32)))
+        chain = [_numbers(extractor.matrix)]
+        if extractor.objects is not None:
+            chain.append(_numbers(extractor.mix))
+        layers[:0] = [(weights, np.zeros(len(weights), np.float32)) for weights in chain]
         features = "symlog"
     return layers, ACTIVATIONS[kinds.pop()] if kinds else "tanh", features
 

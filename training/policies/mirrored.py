@@ -22,7 +22,7 @@ from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import Schedule
 
-from training.policies.reflections import (
+from training.policies.features.reflections import (
     Entry,
     Images,
     all_combinations,
@@ -30,7 +30,7 @@ from training.policies.reflections import (
     unchanged,
     unit_images,
 )
-from training.policies.symlog_features import SymlogOffsets
+from training.policies.features.symlog_features import SymlogOffsets
 from training.settings.errors import UsageError
 
 

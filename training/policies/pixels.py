@@ -9,8 +9,8 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtractor
 from torch import nn
 
-from training.policies.keypoints import cell_centers, map_size
-from training.policies.symlog_features import SymlogOffsets
+from training.policies.features.keypoints import cell_centers, map_size
+from training.policies.features.symlog_features import SymlogOffsets
 from training.settings.config import PIXEL_RULES, SYMLOG_RULES
 from training.settings.errors import UsageError
 
@@ -28,8 +28,8 @@ KEYPOINT_SCALE, GOAL_SCALE = 4.0, 10.0
 class KeypointFeatures(BaseFeaturesExtractor):
     """Features: the keypoints of a picture, and the desired goal.
 
-    See `training.policies.keypoints`. The convolutions see no position in the picture, and the
-    keypoints nothing else, so that few pictures suffice to learn where things are.
+    See `training.policies.features.keypoints`. The convolutions see no position in the picture, and
+    the keypoints nothing else, so that few pictures suffice to learn where things are.
 
     Args:
         space: Observation space with a picture, channels first, and goals.
@@ -129,7 +129,8 @@ class PixelPolicy(MultiInputActorCriticPolicy):
     Args:
         *args: As for Stable-Baselines3's policy.
         filters, keypoints: As for `KeypointFeatures`, the actor's features.
-        differences, components, units: As for `SymlogOffsets`, the critic's features.
+        differences, components, units, next_object: As for `SymlogOffsets`, the critic's
+            features.
         **kwargs: As for Stable-Baselines3's policy.
     """
 

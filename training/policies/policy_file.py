@@ -15,6 +15,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from safetensors.numpy import load, save
 from threadpoolctl import ThreadpoolController
 
 import rigid_envs  # noqa: F401  (registers the ids)
-from training.policies.keypoints import keypoints
+from training.policies.features.keypoints import keypoints
+from training.policies.features.next_object import pass_next
 from training.policies.policy import Policy, check_shapes, of_state
 from training.policies.policy_header import Header, InvalidHeader, read_header, reject_constant
 from training.settings.environments import registered_arguments
@@ -97,9 +99,7 @@ class PolicyFile:
             )
         check_shapes(header.observation, given)
         points, parts = header.network.keypoints, []
-        names = [header.network.activation] * len(self.layers)
-        if header.network.features != "linear":
-            names[0] = header.network.features
+        between = self._between()
         with _BLAS.limit(limits=1, user_api="blas"):
             for key in header.observation:  # in the order of the network's inputs
                 value = read[key]
@@ -113,12 +113,23 @@ class PolicyFile:
             x = np.concatenate(parts, axis=1).astype(np.float64)
             for number, (weights, biases) in enumerate(self.layers):
                 if number:
-                    x = ACTIVATIONS[names[number - 1]](x)
+                    x = between[number - 1](x)
                 x = x @ weights.T.astype(np.float64) + biases
         low, high = np.array(header.network.low), np.array(header.network.high)
         if header.network.squashing in SQUASHING_FUNCTIONS:
             x = low + 0.5 * (SQUASHING_FUNCTIONS[header.network.squashing](x) + 1.0) * (high - low)
         return np.clip(x, low, high).astype(np.float32)
+
+    def _between(self) -> list[Callable[[np.ndarray], np.ndarray]]:
+        """What follows each layer but the last."""
+        network = self.header.network
+        between = [ACTIVATIONS[network.activation]] * (len(self.layers) - 1)
+        if network.features != "linear":
+            first = [ACTIVATIONS[network.features]]
+            if network.next_object is not None:
+                first.insert(0, partial(pass_next, objects=network.next_object))
+            between[: len(first)] = first
+        return between
 
     def to_bytes(self) -> bytes:
         """The bytes of the file.

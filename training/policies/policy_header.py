@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from training.policies.keypoints import map_size
+from training.policies.features.keypoints import map_size
+from training.policies.features.next_object import NextObject
 
 SQUASHING = {"ppo": ("clip", "softsign"), "sac": ("tanh",)}
 """How the network's output becomes an action, by algorithm: clipped to the bounds, or squashed."""
@@ -61,6 +62,9 @@ class Network:
     activation. Files without this entry have "linear"."""
     keypoints: Keypoints | None = None
     """How the picture is observed; None, as in files without this entry, if there is none."""
+    next_object: NextObject | None = None
+    """Blocks of the first layer's outputs of which one passes, see `pass_next`; a layer between
+    them and symlog makes features. None, as in files without this entry, if there are none."""
 
 
 @dataclass(frozen=True)
@@ -197,15 +201,29 @@ def _network(value: Any, algorithm: str) -> Network:
         [_number(x, "network.high") for x in _list(fields["high"], "network.high")],
         _one_of(fields["features"], "network.features", FEATURES),
         _optional(fields["keypoints"], _keypoints),
+        _optional(fields["next_object"], _next_object),
     )
     if len(network.widths) < 2 or min(network.widths) < 1:
         raise InvalidHeader(
             f"network.widths is {network.widths}, should be two or more integers of at least 1"
         )
-    if network.features == "symlog" and len(network.widths) < 3:
+    objects = network.next_object
+    if network.features == "symlog" and len(network.widths) < (3 if objects is None else 4):
         raise InvalidHeader(
             "network.features is 'symlog', should be 'linear': symlog follows the first of at "
-            "least two layers"
+            "least two layers, or the second of at least three with network.next_object"
+        )
+    if objects is not None and (
+        network.features != "symlog"
+        or objects.count < 2
+        or not 1 <= objects.goal <= objects.size
+        or objects.count * objects.size > network.widths[1]
+        or objects.within <= 0
+    ):
+        raise InvalidHeader(
+            f"network.next_object is {objects}, should be two or more blocks of the first layer's "
+            f"{network.widths[1]} outputs, whose size is at least goal, which is at least 1, with "
+            "within above 0; and network.features should be 'symlog'"
         )
     for name, bounds in (("low", network.low), ("high", network.high)):
         if len(bounds) != network.widths[-1]:
@@ -226,6 +244,14 @@ def _keypoints(value: Any) -> Keypoints:
             f"{name} is {filters}, should be a list of [outputs, kernel width, stride]"
         )
     return Keypoints(_text(fields["key"], "network.keypoints.key"), filters)
+
+
+def _next_object(value: Any) -> NextObject:
+    fields = _fields(value, "network.next_object", NextObject)
+    count, size, goal = (
+        _integer(fields[name], f"network.next_object.{name}") for name in ("count", "size", "goal")
+    )
+    return NextObject(count, size, goal, _number(fields["within"], "network.next_object.within"))
 
 
 def _normalization(value: Any) -> Normalization:

@@ -6,8 +6,8 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.sac.policies import MultiInputPolicy
 
 from training.policies.bounded import BoundedPolicy
+from training.policies.features.symlog_features import SymlogOffsets
 from training.policies.mirrored import Mirrored
-from training.policies.symlog_features import SymlogOffsets
 from training.settings.config import SYMLOG_RULES
 
 
@@ -16,7 +16,7 @@ class Symlog:
 
     Args:
         *args: As for the policy.
-        differences, components, units: As for `SymlogOffsets`.
+        differences, components, units, next_object: As for `SymlogOffsets`.
         **kwargs: As for the policy.
     """
 

@@ -25,6 +25,7 @@ from training.settings.settings import (
     layer_widths,
     mapping,
     mirror_list,
+    next_object,
     number,
     number_or_numbers,
     optional,
@@ -56,7 +57,12 @@ NETWORK_RULES = {
 }
 BOUNDED_RULES = {"min_std": number(at_least=0), "state_dependent_std": boolean}
 """Further ones, of policies with a bounded mean."""
-SYMLOG_RULES = {"differences": index_pairs, "components": indices, "units": positive_numbers}
+SYMLOG_RULES = {
+    "differences": index_pairs,
+    "components": indices,
+    "units": positive_numbers,
+    "next_object": next_object,
+}
 """Further ones, of policies with features on a logarithmic scale, in actor or critic."""
 MIRROR_RULES = {"mirrors": mirror_list}
 """Further ones, of policies that are equivariant under reflections."""
@@ -122,8 +128,8 @@ class TrainConfig:
     policy_kwargs: dict[str, Any] = setting(mapping(POLICY_RULES), {})
     """Network: net_arch (hidden layer widths), log_std_init, activation (default: tanh for PPO,
     relu for SAC, as in Stable-Baselines3); min_std and state_dependent_std (bounded policies only);
-    differences, components and units (symlog policies and PixelPolicy only); mirrors (symlog
-    policies of PPO only); filters and keypoints (PixelPolicy only)."""
+    differences, components, units and next_object (symlog policies and PixelPolicy only); mirrors
+    (symlog policies of PPO only); filters and keypoints (PixelPolicy only)."""
     learning_rate: float | str = setting(schedule(), 3e-4)
     """Step size of the optimiser; "lin_3e-4" falls linearly to zero over the run."""
     batch_size: int = setting(integer(2), 64)

@@ -4,6 +4,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from training.settings.components import SLICE
@@ -203,6 +204,25 @@ def index_pairs(value: Any) -> list[list[int]]:
     ):
         raise InvalidValue("a list of pairs of indices, as in [[8, 0], [9, 1]]")
     return pairs
+
+
+def next_object(value: Any) -> dict[str, Any]:
+    """What is observed of each of two or more objects, and how far from its goal each may be."""
+    each = mapping({"components": indices, "differences": index_pairs})
+    found: dict[str, Any] = {}
+    with suppress(InvalidValue):
+        found = mapping({"within": number(above=0), "objects": _list_of(each)})(value)
+    if len(found.get("objects", ())) < 2 or "within" not in found:
+        raise InvalidValue(
+            "what is observed of each of two or more objects in order, and within what distance "
+            "from its goal one is at it, as in {within: 0.04, objects: [{components: [13]}, "
+            "{components: [25], differences: []}]}"
+        )
+    return found
+
+
+def _list_of(rule: Rule) -> Rule:
+    return lambda value: [rule(entry) for entry in _check_type(list, value)]
 
 
 def mirror_list(value: Any) -> list[dict[str, list[Any]]]:

@@ -58,7 +58,7 @@ class PandaStack(PandaTask, GraspingTwin):
     bounds = observed(hand, *CUBES)
     goal_bounds = components(LIMIT, *along_axes(*CUBES))
     draw_count = 6 + 3 + NEAR_GRASP_DRAWS
-    shaping = {"placed": 4.0, "next": 10.0, "reach": 5.0, "grasp": 1.0, "time": -6.0}
+    shaping = {"placed": 4.0, "goals": 10.0, "reach": 5.0, "grasp": 1.0, "time": -6.0}
 
     def __init__(
         self,
@@ -104,8 +104,9 @@ class PandaStack(PandaTask, GraspingTwin):
     ) -> dict[str, Array]:
         """Terms of the next cube: the second one where the first is within 4 cm of its goal.
 
-        `placed`: 1 where it is the second. `next`: minus its distance from its goal, m. And those
-        of grasping it.
+        `placed`: 1 where it is the second. `goals`: minus the sum of both distances from the goals,
+        m: unlike that of the next cube alone, it doesn't jump where the turn changes. And those of
+        grasping the next cube.
         """
         cubes, goals = achieved.reshape(-1, 2, 3), desired.reshape(-1, 2, 3)
         lacking = distance(cubes, goals)
@@ -113,6 +114,6 @@ class PandaStack(PandaTask, GraspingTwin):
         next_one = np.arange(len(cubes)), placed.astype(int)
         return {
             "placed": placed.astype(float),
-            "next": -lacking[next_one],
+            "goals": -lacking.sum(axis=1),
             **self.grasp_terms(now, cubes[next_one]),
         }

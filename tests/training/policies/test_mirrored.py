@@ -7,11 +7,11 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import FloatSchedule
 
+from training.policies.features.reflections import reflection, unchanged
+from training.policies.features.symlog_features import SymlogOffsets
 from training.policies.mirrored import Average
 from training.policies.policy_file import load_policy_file
-from training.policies.reflections import reflection, unchanged
 from training.policies.symlog import BoundedSymlogPolicy
-from training.policies.symlog_features import SymlogOffsets
 from training.sb3.train import train
 from training.settings.algorithms import BOUNDED_SYMLOG_POLICY, SYMLOG_PPO_POLICY
 from training.settings.config_file import load_config

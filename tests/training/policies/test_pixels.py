@@ -6,7 +6,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3 import PPO
 
-from training.policies.keypoints import keypoints, map_size
+from training.policies.features.keypoints import keypoints, map_size
 from training.policies.pixels import KeypointFeatures, PixelPolicy, StateFeatures
 from training.policies.policy_file import load_policy_file, read_policy
 from training.policies.trained_policy import trained_policy

@@ -7,13 +7,13 @@ from gymnasium import spaces
 from stable_baselines3 import PPO, SAC
 
 from tests.training.reach import ReachVectorEnv
+from training.policies.features.symlog_features import UNITS, SymlogOffsets
 from training.policies.policy_file import load_policy_file
 from training.policies.symlog import (
     BoundedSymlogPolicy,
     SymlogActorCriticPolicy,
     SymlogPolicy,
 )
-from training.policies.symlog_features import UNITS, SymlogOffsets
 from training.policies.trained_policy import trained_policy
 from training.sb3.train import train
 from training.sb3.vec_env import RigidVecEnv

@@ -1,0 +1,1 @@
+"""What networks compute from observations before their first layer of weights."""
