@@ -11,8 +11,8 @@ from torch import nn
 
 from training.policies.features.keypoints import cell_centers, map_size
 from training.policies.features.symlog_features import SymlogOffsets
-from training.settings.config import PIXEL_RULES, SYMLOG_RULES
 from training.settings.errors import UsageError
+from training.settings.network_settings import PIXEL_RULES, SYMLOG_RULES
 
 FILTERS = ((16, 5, 3), (16, 3, 1))
 """By default: outputs, kernel width and stride of the convolutions before that of the maps."""

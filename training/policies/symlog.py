@@ -8,7 +8,7 @@ from stable_baselines3.sac.policies import MultiInputPolicy
 from training.policies.bounded import BoundedPolicy
 from training.policies.features.symlog_features import SymlogOffsets
 from training.policies.mirrored import Mirrored
-from training.settings.config import SYMLOG_RULES
+from training.settings.network_settings import SYMLOG_RULES
 
 
 class Symlog:

@@ -12,24 +12,22 @@ from typing import Any, ClassVar, Self
 import yaml
 
 from training.settings.errors import UsageError, nearest
+from training.settings.network_settings import (
+    BOUNDED_RULES,
+    MIRROR_RULES,
+    PIXEL_RULES,
+    POLICY_RULES,
+    SYMLOG_RULES,
+)
 from training.settings.seed_ranges import LIMIT
 from training.settings.settings import (
-    MOST_FILTERS,
     InvalidValue,
     boolean,
     choice,
-    filter_list,
-    index_pairs,
-    indices,
     integer,
-    layer_widths,
     mapping,
-    mirror_list,
-    next_object,
     number,
-    number_or_numbers,
     optional,
-    positive_numbers,
     schedule,
     setting,
     true_false_or,
@@ -50,25 +48,6 @@ ACTION_WRAPPERS = (
     "rigid_envs.wrappers.SmoothnessPenalty",
 )
 """Wrappers whose reward depends on the action, so that HER cannot recompute it from goals."""
-NETWORK_RULES = {
-    "net_arch": layer_widths,
-    "activation": choice("tanh", "relu", "elu"),
-    "log_std_init": number_or_numbers,
-}
-BOUNDED_RULES = {"min_std": number(at_least=0), "state_dependent_std": boolean}
-"""Further ones, of policies with a bounded mean."""
-SYMLOG_RULES = {
-    "differences": index_pairs,
-    "components": indices,
-    "units": positive_numbers,
-    "next_object": next_object,
-}
-"""Further ones, of policies with features on a logarithmic scale, in actor or critic."""
-MIRROR_RULES = {"mirrors": mirror_list}
-"""Further ones, of policies that are equivariant under reflections."""
-PIXEL_RULES = {"filters": filter_list, "keypoints": integer(1, MOST_FILTERS)}
-"""Further ones, of policies that act from pixels."""
-POLICY_RULES = NETWORK_RULES | BOUNDED_RULES | SYMLOG_RULES | MIRROR_RULES | PIXEL_RULES
 NORMALIZE_RULES = {"norm_obs": boolean, "norm_reward": boolean, "epsilon": number(above=0)}
 """Arguments of VecNormalize: what is scaled, by default both, and what is added to variances."""
 

@@ -4,10 +4,8 @@ import dataclasses
 import math
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Any
 
-from training.settings.components import SLICE
 from training.settings.errors import nearest
 
 Rule = Callable[[Any], Any]
@@ -23,10 +21,6 @@ def setting(rule: Rule, default: Any = dataclasses.MISSING) -> Any:
     if isinstance(default, dict):
         return dataclasses.field(default_factory=default.copy, metadata={"rule": rule})
     return dataclasses.field(default=default, metadata={"rule": rule})
-
-
-MOST_FILTERS = 1024
-"""Largest number of maps, width and stride of a convolution: more than two cores can train."""
 
 
 def integer(at_least: int, at_most: float = math.inf) -> Rule:
@@ -144,35 +138,6 @@ def optional(rule: Rule) -> Rule:
     return check
 
 
-def layer_widths(value: Any) -> list[int]:
-    """Widths of the hidden layers, as in [64, 64]."""
-    try:
-        return [integer(1)(width) for width in _check_type(list, value)]
-    except InvalidValue:
-        raise InvalidValue("a list of layer widths, as in [64, 64]") from None
-
-
-def number_or_numbers(value: Any) -> float | list[float]:
-    """A finite number, or a list of them, as in [-1.9, -1.0]."""
-    try:
-        if isinstance(value, list) and value:
-            return [number()(entry) for entry in value]
-        return float(number()(value))
-    except InvalidValue as error:
-        raise InvalidValue(f"{error}, or a list of numbers, as in [-1.9, -1.0]") from None
-
-
-def positive_numbers(value: Any) -> list[float]:
-    """One or more numbers above 0, as in [0.1, 0.01]."""
-    try:
-        numbers = [number(above=0)(entry) for entry in _check_type(list, value)]
-    except InvalidValue:
-        numbers = []
-    if not numbers:
-        raise InvalidValue("a list of one or more numbers above 0, as in [0.1, 0.01]")
-    return numbers
-
-
 def true_false_or(keys: Mapping[str, Rule]) -> Rule:
     """true, false, or a mapping with these keys."""
 
@@ -186,86 +151,24 @@ def true_false_or(keys: Mapping[str, Rule]) -> Rule:
     return check
 
 
-def indices(value: Any) -> list[int | str]:
-    """Indices or slices, as in [0, 1, -1, "3:9:2"]; numbers below 0 count from the end."""
-    if not isinstance(value, list) or not all(
-        type(entry) is int or (isinstance(entry, str) and SLICE.fullmatch(entry)) for entry in value
-    ):
-        raise InvalidValue('a list of indices, as in [0, 1, -1], or slices, as in ["3:9:2"]')
-    return value
+def list_of(rule: Rule) -> Rule:
+    """A list, each entry under the rule."""
 
+    def check(value: Any) -> list[Any]:
+        if not isinstance(value, list):
+            raise InvalidValue("a list")
+        return [rule(entry) for entry in value]
 
-def index_pairs(value: Any) -> list[list[int]]:
-    """Pairs of indices, as in [[8, 0], [9, 1]]."""
-    pairs = value if isinstance(value, list) else [[]]
-    if not all(
-        isinstance(pair, list) and len(pair) == 2 and all(type(one) is int for one in pair)
-        for pair in pairs
-    ):
-        raise InvalidValue("a list of pairs of indices, as in [[8, 0], [9, 1]]")
-    return pairs
-
-
-def next_object(value: Any) -> dict[str, Any]:
-    """What is observed of each of two or more objects, and how far from its goal each may be."""
-    each = mapping({"components": indices, "differences": index_pairs})
-    found: dict[str, Any] = {}
-    with suppress(InvalidValue):
-        found = mapping({"within": number(above=0), "objects": _list_of(each)})(value)
-    if len(found.get("objects", ())) < 2 or "within" not in found:
-        raise InvalidValue(
-            "what is observed of each of two or more objects in order, and within what distance "
-            "from its goal one is at it, as in {within: 0.04, objects: [{components: [13]}, "
-            "{components: [25], differences: []}]}"
-        )
-    return found
-
-
-def _list_of(rule: Rule) -> Rule:
-    return lambda value: [rule(entry) for entry in _check_type(list, value)]
-
-
-def mirror_list(value: Any) -> list[dict[str, list[Any]]]:
-    """What changes in mirrors: components that change sign, and pairs that change places."""
-
-    def entries(one: Any) -> list[Any]:
-        pairs = [entry for entry in _check_type(list, one) if isinstance(entry, list)]
-        index_pairs(pairs)
-        indices([entry for entry in one if not isinstance(entry, list)])
-        return list(one)
-
-    keys = mapping(dict.fromkeys(("observation", "goal", "actions"), entries))
-    try:
-        return [keys(mirror) for mirror in _check_type(list, value)]
-    except InvalidValue as error:
-        raise InvalidValue(
-            "a list of what changes in each mirror, components that change sign and pairs that "
-            f"change places, as in [{{observation: [0, [3, 4]], actions: [0]}}]: {error}"
-        ) from None
-
-
-def filter_list(value: Any) -> list[list[int]]:
-    """Outputs, kernel width and stride of convolutions, as in [[16, 5, 3], [16, 3, 1]]."""
-    try:
-        filters = [
-            [integer(1)(x) for x in _check_type(list, one)] for one in _check_type(list, value)
-        ]
-    except InvalidValue:
-        filters = [[]]
-    if any(len(one) != 3 or max(one) > MOST_FILTERS for one in filters):
-        raise InvalidValue(
-            "a list of [outputs, kernel width, stride] of convolutions, as in [[16, 5, 3]], up to "
-            f"{MOST_FILTERS} each"
-        )
-    return filters
+    return check
 
 
 def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
     """A mapping with text keys; with `keys`, only those are valid, each value under its rule."""
 
     def check(value: Any) -> dict[str, Any]:
-        entries = _check_type(dict, value)
-        for key in entries:
+        if not isinstance(value, dict):
+            raise InvalidValue("a mapping, as in {key: value}")
+        for key in value:
             if not isinstance(key, str):
                 raise InvalidValue(f"a mapping whose keys are text, not {key!r}")
             if keys is not None and key not in keys:
@@ -274,8 +177,8 @@ def mapping(keys: Mapping[str, Rule] | None = None) -> Rule:
                     f"did you mean {nearest(key, keys)!r} instead of {key!r}?"
                 )
         if keys is None:
-            return dict(entries)
-        return {key: _check_entry(key, keys[key], entry) for key, entry in entries.items()}
+            return dict(value)
+        return {key: _check_entry(key, keys[key], entry) for key, entry in value.items()}
 
     return check
 
@@ -309,12 +212,6 @@ def _check_entry(key: str, rule: Rule, value: Any) -> Any:
         return rule(value)
     except InvalidValue as error:
         raise InvalidValue(f"a mapping in which {key} is {error}") from None
-
-
-def _check_type(kind: type, value: Any) -> Any:
-    if not isinstance(value, kind):
-        raise InvalidValue("a mapping, as in {key: value}" if kind is dict else "a list")
-    return value
 
 
 def _is_number(value: Any) -> bool:
