@@ -33,6 +33,8 @@ def main() -> None:
         sliding, creeping, sinking = identify.pressing(recordings.Recording.load("fetch-presses"))
         print(f"it presses on the table: sliding {sliding:.2f}, creeping {creeping:.2f}, "
               f"sinking {sinking:.2f}")  # fmt: skip
+        holding, creeping = identify.grips(recordings.Recording.load("fetch-grips"))
+        print(f"and then its fingers: holding {holding:.1f}, creeping {creeping:.3f}")
         slides = recordings.Recording.load("fetch-slides")
         sliding, creeping, gliding = identify.braking(slides)
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "

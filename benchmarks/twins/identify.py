@@ -7,6 +7,7 @@ from benchmarks.twins.recordings import Recording
 from physics import World
 from rigid_envs.twins.fetch import hand as fetch
 from rigid_envs.twins.fetch import slide
+from rigid_envs.twins.fetch.pick_and_place import FetchPickAndPlace
 from rigid_envs.twins.fetch.reach import FetchReach
 from rigid_envs.twins.servo import Servo
 
@@ -38,6 +39,37 @@ def servo(recording: Recording) -> tuple[float, float]:
 
     frequency, damping, _ = least_squares(lack, (50.0, 1.0, 0.05)).x
     return frequency, damping
+
+
+def grips(recording: Recording) -> tuple[float, float]:
+    """`HOLDING` and `FINGER_CREEPING` of Fetch hands that close while they press on the table.
+
+    Of the steps in which a free finger would move by more than a millimetre.
+    """
+    hand, velocity = recording.observations[..., :3], recording.observations[..., 20:23] / FRAME
+    fingers = recording.observations[..., 9:11].mean(axis=-1)
+    speeds = recording.observations[..., 23:25].mean(axis=-1) / FRAME
+    task = FetchPickAndPlace()
+    world = World(task.scene(), count=hand.shape[1])
+    ahead, before, below, moved = [], [], [], []
+    for step, actions in enumerate(recording.actions):
+        asked = fetch.STRIDE * actions[:, :3]
+        free = task.hand.arm.respond(world, hand[step], velocity[step], asked, FRAME).moved[:, -1]
+        world.advance(FRAME)
+        lacking = np.maximum(fetch.RESTING - hand[step, :, 2] - free[:, 2], 0.0)
+        below.append(lacking)
+        ahead.append(np.clip(fingers[step] + actions[:, 3], 0.0, fetch.FARTHEST) - fingers[step])
+        before.append(speeds[step])
+        moved.append(fingers[step + 1] - fingers[step])
+    parts = [np.concatenate(x) for x in (ahead, before, below, moved)]
+    used = (parts[0] < -1e-3) & (parts[2] > 1e-3)
+    a, v, b, m = (x[used] for x in parts)
+
+    def lack(parameters: Array) -> float:
+        return float(np.abs(fetch.fingers_move(a, v, b, FRAME, *parameters)[0] - m).mean())
+
+    found = minimize(lack, (2.0, 0.01), method="Nelder-Mead").x
+    return float(found[0]), float(found[1])
 
 
 def pressing(recording: Recording) -> tuple[float, float, float]:

@@ -68,6 +68,7 @@ KINDS = {
         lambda n, size: scripts.wandering(n, size, FETCH_LOW, FETCH_HIGH, 0),
     ),
     "fetch-presses": Kind("FetchReach-v4", 20, 20, scripts.pressing),
+    "fetch-grips": Kind("FetchPickAndPlace-v4", 20, 18, scripts.gripping),
     "fetch-pushes": Kind(
         "FetchPush-v4", 50, 49,
         lambda n, size: scripts.pushing(n, size, 3, 0.5, 0.418, 0.075, 0.03, 0),
@@ -78,6 +79,7 @@ KINDS = {
         "PandaReach-v3", 20, 49,
         lambda n, size: scripts.wandering(n, size, PANDA_LOW, PANDA_HIGH, 0),
     ),
+    "panda-presses": Kind("PandaReach-v3", 20, 20, scripts.sliding),
     "panda-pushes": Kind(
         "PandaPush-v3", 50, 49,
         lambda n, size: scripts.pushing(n, size, 6, 0.09, 0.012, 0.06, 0.03, 0),

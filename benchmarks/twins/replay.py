@@ -7,12 +7,14 @@ import numpy as np
 from benchmarks.twins.recordings import Recording
 from physics import World
 from rigid_envs.twins import TWINS
+from rigid_envs.twins.grasping_twin import GraspingTwin
 from rigid_envs.twins.twin import Twin
 
 Array = np.ndarray
 
 # first component of the object's position in observations, by the first word of names
 OBJECT = {"fetch": 3, "panda": 6}
+FINGERS = 9  # first component of the two fingers, of Fetch
 
 
 class Replay(NamedTuple):
@@ -21,10 +23,12 @@ class Replay(NamedTuple):
     Attributes:
         hand: [steps + 1, episodes, 3] m.
         body: [steps + 1, episodes, 3] m, of the object; no episodes if there is none.
+        opening: [steps + 1, episodes] m, how far each finger is open; 0 of closed hands.
     """
 
     hand: Array
     body: Array
+    opening: Array
 
 
 def replay(recording: Recording, twin: Twin, fidelity: str = "balanced") -> Replay:
@@ -35,23 +39,30 @@ def replay(recording: Recording, twin: Twin, fidelity: str = "balanced") -> Repl
     bodies = len(world.scene.bodies)
     if bodies:
         world.set_state(position=recording.observations[0, :, None, first : first + 3])
-    hands, body = [], []
+    hands, body, opening = [], [], []
     hand = twin.hand  # type: ignore[attr-defined]
     now = world.read()
     for step in range(len(recording.actions) + 1):
         hands.append(np.array(hand.position(now)))
+        opening.append(hand.opening(now) if isinstance(twin, GraspingTwin) else np.zeros(count))
         if bodies:
             body.append(np.array(now.position[:, 0]))
         if step < len(recording.actions):
             twin.advance(world, now, recording.actions[step])
             now = world.read()
-    return Replay(np.array(hands), np.array(body))
+    return Replay(np.array(hands), np.array(body), np.array(opening))
 
 
 def hand_errors(recording: Recording, found: Replay, steps: int = 12) -> Array:
     """Distance [episodes] m of the hands after some steps."""
     offset = found.hand[steps] - recording.observations[steps, :, :3]
     return np.asarray(np.linalg.norm(offset, axis=1))
+
+
+def finger_errors(recording: Recording, found: Replay) -> Array:
+    """How far the fingers [episodes] m of Fetch hands are off after the last step."""
+    there = recording.observations[-1, :, FINGERS : FINGERS + 2].mean(axis=1)
+    return np.asarray(np.abs(found.opening[-1] - there))
 
 
 def body_errors(recording: Recording, found: Replay, first: int) -> Array:
@@ -66,10 +77,12 @@ REPLAYED = {
     "fetch-axes": "fetch_reach",
     "fetch-motions": "fetch_reach",
     "fetch-presses": "fetch_reach",
+    "fetch-grips": "fetch_pick_and_place",
     "fetch-pushes": "fetch_push",
     "fetch-slides": "fetch_slide",
     "panda-axes": "panda_reach",
     "panda-motions": "panda_reach",
+    "panda-presses": "panda_reach",
     "panda-pushes": "panda_push",
 }
 
@@ -81,7 +94,13 @@ def summary() -> list[str]:
         recording = Recording.load(name)
         found = replay(recording, TWINS[twin]())
         parts = [f"{name:15}"]
-        if len(found.body):
+        if name == "fetch-grips":
+            errors = 1e3 * finger_errors(recording, found)
+            parts.append(
+                f"fingers after the last step: median {np.median(errors):6.2f} mm, at most "
+                f"{errors.max():6.2f} mm"
+            )
+        elif len(found.body):
             errors = 1e3 * body_errors(recording, found, OBJECT[name[:5]])
             moved = np.linalg.norm(np.diff(found.body[[0, -1]], axis=0)[0], axis=1) > 0.01
             parts.append(
@@ -89,7 +108,7 @@ def summary() -> list[str]:
                 f"{np.quantile(errors, 0.9):6.1f} mm; {moved.sum()} of {len(moved)} moved"
             )
         else:
-            steps = PRESSED if name == "fetch-presses" else 12
+            steps = PRESSED if name.endswith("presses") else 12
             errors = 1e3 * hand_errors(recording, found, steps)
             parts.append(
                 f"hand after {steps} steps: median {np.median(errors):6.2f} mm, at most "

@@ -48,6 +48,7 @@ def wandering(worlds: int, size: int, low: Array, high: Array, seed: int) -> Act
 
 PRESSES = (0.0, -0.1, -0.2, -0.5, -1.0)
 ALONG = (0.1, 0.2, 0.5, 1.0)
+GRIPS = tuple(-0.1 * (i + 1) for i in range(10))
 
 
 def pressing(worlds: int, size: int) -> Actor:
@@ -62,6 +63,41 @@ def pressing(worlds: int, size: int) -> Actor:
         actions = np.zeros((worlds, size))
         actions[:, 2] = -0.5 if step < 12 else down
         actions[:, 1] = along if step >= 15 else 0.0
+        return actions
+
+    return act
+
+
+def sliding(worlds: int, size: int) -> Actor:
+    """Lowers hands onto the table, then moves them along x, slowly along y, as they press on it.
+
+    World i presses with PRESSES[i % 5] and moves along y with 0.5 ALONG[i // 5 % 4].
+    """
+    down = np.array(PRESSES)[np.arange(worlds) % len(PRESSES)]
+    along = 0.5 * np.array(ALONG)[np.arange(worlds) // len(PRESSES) % len(ALONG)]
+
+    def act(observations: dict[str, Array], step: int) -> Array:
+        actions = np.zeros((worlds, size))
+        actions[:, 0] = -0.8 if step < 6 else 0.8 if step >= 12 else 0.0
+        actions[:, 1] = along if step >= 12 else 0.0
+        actions[:, 2] = 0.0 if step < 6 else -0.8 if step < 11 else down
+        return actions
+
+    return act
+
+
+def gripping(worlds: int, size: int) -> Actor:
+    """Lowers open hands, then closes them while they go down and press on the table.
+
+    World i closes its fingers a step earlier if i is odd, and presses with GRIPS[i // 2 % 10].
+    """
+    down = np.array(GRIPS)[np.arange(worlds) // 2 % len(GRIPS)]
+    early = np.arange(worlds) % 2
+
+    def act(observations: dict[str, Array], step: int) -> Array:
+        actions = np.zeros((worlds, size))
+        actions[:, 2] = -0.7 if step < 3 else -0.1 if step < 5 else down
+        actions[:, 3] = np.where(step + early < 7, 1.0, -1.0)
         return actions
 
     return act

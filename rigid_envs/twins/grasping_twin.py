@@ -23,10 +23,12 @@ class GraspingTwin(Twin):
     Attributes:
         hand: the hand, with the methods `position`, `opening` and `pads`.
         half: m, half the width of the object.
+        closed: part of the starts around the object in which the fingers already touch it.
     """
 
     hand: ClassVar[Any]
     half: ClassVar[float]
+    closed: ClassVar[float] = 0.0
 
     def __init__(self, shaped: bool = False, near_grasp_start_prob: float = 0.0) -> None:
         """Checks the probability."""
@@ -40,8 +42,9 @@ class GraspingTwin(Twin):
     ) -> None:
         """Moves the hand around a body in some worlds, see the function of this name."""
         chosen, position = start_near_grasps(
-            world, mask, draws, self.near_grasp_start_prob, self.hand.pads, self.half, body
-        )
+            world, mask, draws, self.near_grasp_start_prob, self.hand.pads, self.half, body,
+            self.closed,
+        )  # fmt: skip
         if len(position):
             self.hand.place(world, chosen, position)
 

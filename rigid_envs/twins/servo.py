@@ -105,6 +105,6 @@ def _substeps(
 
 
 def move_set_points(world: World, start: Array, speed: Array, time: float) -> None:
-    """Moves the set points of all drives from `start` [n, drives, 3] m at a speed [n, 3] m/s."""
+    """Moves the set points of all drives from `start` at `speed`, [n, drives, 3] m and m/s."""
     world.move_drives(start, 0.0)
-    world.move_drives(start + time * speed[:, None], time, renew_forces=True)
+    world.move_drives(start + time * speed, time, renew_forces=True)

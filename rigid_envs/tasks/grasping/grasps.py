@@ -29,6 +29,7 @@ def start_near_grasps(
     pads: Callable[[Array, Array], Array],
     half: float,
     body: Array | int = 0,
+    closed: float = 0.0,
 ) -> tuple[Array, Array]:
     """Moves the open hand around a body, or just above it, in some worlds that were just reset.
 
@@ -41,6 +42,7 @@ def start_near_grasps(
             is open, [k] m.
         half: m, half the width of the body.
         body: [n] its index.
+        closed: part of these starts in which the fingers already touch the body.
 
     Returns:
         Which worlds' hands were moved, [count] bool, and to where, [k, 3] m.
@@ -52,7 +54,8 @@ def start_near_grasps(
         return chosen, np.zeros((0, 3))
     middle = world.position[np.flatnonzero(chosen), np.broadcast_to(body, len(draws))[near]]
     middle = middle + _RANGE * (draws[near, 1:4] - (0.5, 0.5, 0.0))
-    world.set_state(drive_position=pads(middle, half + _GAP * draws[near, 4]), worlds=chosen)
+    gap = _GAP * np.maximum(draws[near, 4] - closed, 0.0) / (1.0 - closed)
+    world.set_state(drive_position=pads(middle, half + gap), worlds=chosen)
     return chosen, middle
 
 

@@ -27,6 +27,9 @@ RESTING = 0.4195  # m, height of a hand that rests on the table
 # downwards where it slides, and the part that is lost where it creeps
 SLIDING, CREEPING = 0.95, 0.54
 SINKING = 0.11  # m that a hand on the table sinks per m of displacement that it lacks downwards
+# friction holds fingers of a hand that presses: up to so many m from their set point per m of
+# displacement that it lacks downwards. Held ones creep by this part of the distance in a step
+HOLDING, FINGER_CREEPING = 2.8, 0.012
 
 # from the originals' model. Boxes of fingers are 1 mm larger: their contacts begin at that distance
 MARGIN = 1e-3  # m
@@ -79,8 +82,8 @@ class ClosedHand:
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand by actions [count, 4]; the last component has no effect."""
-        ahead, speed = _follow(self, world, now, actions, frame)
-        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, frame)
+        ahead, speed, _ = _follow(self, world, now, actions, frame)
+        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed[:, None], frame)
 
     def position(self, now: Readout) -> Array:
         """Position [count, 3] m of the grip site."""
@@ -129,13 +132,17 @@ class OpenHand:
 
     def act(self, world: World, now: Readout, actions: Array, frame: float) -> None:
         """Moves the hand and its fingers by actions [count, 4]; a grip of -1 closes."""
+        ahead, speed, below = _follow(self, world, now, actions, frame)
         opening, velocity = self.fingers(now)
         target = np.clip(opening + actions[:, 3], 0.0, FARTHEST)
-        moved, _ = FINGER.answer(frame, target - opening, velocity)
-        moved = np.clip(opening + moved, 0.0, WIDEST) - opening
-        opening = opening + SERVO.ahead(frame, world.fidelity.substep, moved, velocity)
-        ahead, speed = _follow(self, world, now, actions, frame)
-        move_set_points(world, self.pads(self.position(now) + ahead, opening), speed, frame)
+        moved, end = fingers_move(target - opening, velocity, below, frame)
+        reached = np.clip(opening + moved, 0.0, WIDEST)
+        end = np.where(reached == opening + moved, end, 0.0)
+        wider, opens = SERVO.moving(frame, world.fidelity.substep, velocity, reached - opening, end)
+        speeds = np.stack([speed, speed], axis=1)
+        speeds[:, :, 1] += opens[:, None] * (-1.0, 1.0)
+        start = self.pads(self.position(now) + ahead, opening + wider)
+        move_set_points(world, start, speeds, frame)
 
     def place(self, world: World, worlds: Array, position: Array) -> None:
         """Tells the arm that hands were moved, see `Arm.place`."""
@@ -171,11 +178,12 @@ class OpenHand:
 
 def _follow(
     hand: ClosedHand | OpenHand, world: World, now: Readout, actions: Array, frame: float
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """How the set point must move for actions [n, 4] to have the arm's answer.
 
     Returns:
-        How far ahead of the hand it starts, [n, 3] m, and its velocity, [n, 3] m/s.
+        How far ahead of the hand it starts, [n, 3] m, its velocity, [n, 3] m/s, and which
+        displacement downwards the hand lacks because it meets the table, [n] m.
     """
     position, velocity = hand.position(now), hand.velocity(now).astype(float)
     free = hand.arm.respond(world, position, velocity, STRIDE * actions[:, :3], frame)
@@ -186,7 +194,31 @@ def _follow(
     below = np.maximum(RESTING - position[:, 2] - moved[:, 2], 0.0)
     moved[:, 2] += (1.0 - SINKING) * below
     end[:, 2] = np.where(below > 0.0, 0.0, end[:, 2])
-    return SERVO.moving(frame, world.fidelity.substep, velocity, moved, end)
+    return *SERVO.moving(frame, world.fidelity.substep, velocity, moved, end), below
+
+
+def fingers_move(
+    ahead: Array,
+    velocity: Array,
+    below: Array,
+    frame: float,
+    holding: float = HOLDING,
+    creeping: float = FINGER_CREEPING,
+) -> tuple[Array, Array]:
+    """Displacement [n] m of fingers in a step that meet no object, and velocity [n] m/s at its end.
+
+    Args:
+        ahead: [n] m, of their set points from them.
+        velocity: [n] m/s.
+        below: [n] m, which displacement downwards the hand lacks because it meets the table.
+        frame: s, duration of a step.
+        holding: see `HOLDING`.
+        creeping: see `FINGER_CREEPING`.
+    """
+    excess = np.maximum(np.abs(ahead) - holding * below, 0.0)
+    held = np.copysign(np.abs(ahead) - excess, ahead)
+    moved, end = FINGER.answer(frame, ahead - held, np.where(excess > 0.0, velocity, 0.0))
+    return moved + creeping * held, end
 
 
 def braked(

@@ -7,7 +7,7 @@ import numpy as np
 from physics import Body, Readout, World
 from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
 from rigid_envs.twins.fetch.arm import HIGH
-from rigid_envs.twins.fetch.hand import OpenHand
+from rigid_envs.twins.fetch.hand import RESTING, OpenHand
 from rigid_envs.twins.fetch.push import HALF, cube
 from rigid_envs.twins.fetch.task import FetchObject
 from rigid_envs.twins.grasping_twin import GraspingTwin
@@ -15,6 +15,8 @@ from rigid_envs.twins.grasping_twin import GraspingTwin
 Array = np.ndarray
 
 HIGHEST = 0.45  # m, of a goal above the table
+CLEAR = 2e-3  # m, of a hand over where it rests on the table
+ABOVE = 0.01  # m, of the grip over the cube's middle, to which the shaped reward leads the hand
 
 
 class FetchPickAndPlace(FetchObject, GraspingTwin):
@@ -23,8 +25,9 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
     original = "FetchPickAndPlace-v4"
     hand: ClassVar[OpenHand] = OpenHand(HIGH)
     half = HALF
+    closed = 0.5
     draw_count = FetchObject.draw_count + NEAR_GRASP_DRAWS
-    shaping = {"success": 1.0, "distance": 10.0, "reach": 5.0, "grasp": 1.0}
+    shaping = {"success": 1.0, "distance": 10.0, "reach": 5.0, "grasp": 1.0, "table": 0.5}
 
     def object(self) -> Body:
         """The cube."""
@@ -41,5 +44,10 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """Those of a grasp."""
-        return self.grasp_terms(now, achieved)
+        """Those of a grasp, above the cube's middle. `table`: -1 where the hand is on the table.
+
+        There friction would hold its fingers.
+        """
+        low = self.hand.position(now)[:, 2] < RESTING + CLEAR
+        terms = self.grasp_terms(now, achieved + np.array([0.0, 0.0, ABOVE]))
+        return {**terms, "table": -low.astype(float)}

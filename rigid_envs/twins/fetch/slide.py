@@ -3,7 +3,8 @@
 The puck of the original touches the table with one or two points, sinks 6 mm into it and tumbles a
 little. So how the table brakes it is taken from recorded slides, not from a coefficient: MuJoCo's
 friction pyramid limits the sum of the forces along x and y, a slow puck is braked in proportion to
-its speed, and once it is as slow as a few centimetres per second it glides on.
+its speed, and once it is as slow as a few centimetres per second it glides on, faster or slower in
+each episode. How fast is kept in the world's `memory`, as the difference from the average.
 """
 
 import numpy as np
@@ -22,7 +23,8 @@ REACH = 0.4  # m along x from the hand's start; beyond it the hand can't follow 
 # identified by `python -m benchmarks.twins identify`
 SLIDING = 0.98  # m/s^2, largest sum of the decelerations along x and y
 CREEPING = 5.12  # 1/s, deceleration of a slow puck per speed above that at which it glides
-GLIDING = 0.041  # m/s
+GLIDING = 0.041  # m/s, on average
+GLIDES = 0.034  # m/s, largest difference from that average in an episode
 
 # of the prediction where a puck will be: most episodes end that long after the hit
 _STEP, _STEPS = 0.1, 12  # s
@@ -40,6 +42,7 @@ class FetchSlide(FetchObject):
     goal_height = 0.41401894
     ground = start_height - HALF_HEIGHT
     ground_friction = 0.0  # see `braking`
+    draw_count = FetchObject.draw_count + 1
     shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0}
 
     def object(self) -> Body:
@@ -50,11 +53,18 @@ class FetchSlide(FetchObject):
             group=OBJECT, mask=OBJECT | HAND,
         )  # fmt: skip
 
+    def start(self, world: World, mask: Array, draws: Array) -> Array:
+        """The puck at least 10 cm beside the hand; how fast it glides is drawn, too."""
+        goals = super().start(world, mask, draws[:, :-1])
+        world.memory("glide", 1)[mask] = GLIDES * (2.0 * draws[:, -1:] - 1.0)
+        return goals
+
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis; the table brakes the puck."""
         super().act(world, now, actions)
         force = np.zeros((world.count, 3))
-        force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2])
+        gliding = GLIDING + world.memory("glide", 1)
+        force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2], gliding=gliding)
         world.apply_wrench(force, body="puck")
 
     def guidance(
@@ -67,7 +77,8 @@ class FetchSlide(FetchObject):
         `reach`: as in the other tasks, until the puck is out of reach.
         """
         end = np.array(achieved, dtype=float)
-        end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2])
+        gliding = GLIDING + world.memory("glide", 1)
+        end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2], gliding)
         reach = super().guidance(world, now, achieved, desired, goal_distance)["reach"]
         gone = achieved[:, 0] > self.hand.start[0] + REACH
         miss = distance(end, desired)
@@ -79,12 +90,18 @@ def braking(
     velocity: Array,
     sliding: float = SLIDING,
     creeping: float = CREEPING,
-    gliding: float = GLIDING,
+    gliding: Array | float = GLIDING,
 ) -> Array:
     """Acceleration [n, 2] m/s^2 of a puck that slides with a velocity [n, 2] m/s.
 
     Of those that the pyramid allows, |x| + |y| <= sliding, the one nearest to that of a creeping
     puck, -creeping v (1 - gliding / |v|).
+
+    Args:
+        velocity: [n, 2] m/s.
+        sliding: see `SLIDING`.
+        creeping: see `CREEPING`.
+        gliding: m/s, at which it glides on; one number, or [n, 1].
     """
     speed = np.sqrt(np.sum(velocity.astype(float) ** 2, axis=1, keepdims=True))
     above = 1.0 - gliding / np.maximum(speed, gliding)
@@ -94,11 +111,17 @@ def braking(
     return -np.sign(velocity) * nearest
 
 
-def predicted(position: Array, velocity: Array) -> Array:
-    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will be."""
+def predicted(position: Array, velocity: Array, gliding: Array | float = GLIDING) -> Array:
+    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will be.
+
+    Args:
+        position: [n, 2] m.
+        velocity: [n, 2] m/s.
+        gliding: see `braking`.
+    """
     velocity = velocity.astype(float)
     for _ in range(_STEPS):
-        after = velocity + _STEP * braking(velocity)
+        after = velocity + _STEP * braking(velocity, gliding=gliding)
         position = position + 0.5 * _STEP * (velocity + after)
         velocity = after
     return position

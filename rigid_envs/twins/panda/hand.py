@@ -49,7 +49,11 @@ FINGERS, _MIDDLE = _closed_fingers()
 
 
 class ClosedHand:
-    """The closed fingers, one solid."""
+    """The closed fingers, one solid.
+
+    Args:
+        shape: their shape, whose middle is that of `FINGERS`.
+    """
 
     actions: ClassVar = ("hand x", "hand y", "hand z")
     names: ClassVar = ()
@@ -60,10 +64,13 @@ class ClosedHand:
     SERVO: ClassVar = Servo(100.0, 1.3)
     FORCE: ClassVar[float] = 1e4  # N, chosen: the servo is never limited
 
+    def __init__(self, shape: Box | Compound = FINGERS) -> None:
+        self.shape = shape
+
     def drive(self) -> Drive:
         """The drive of a scene."""
         return Drive(
-            FINGERS, mass=MASS, force_limit=self.FORCE,
+            self.shape, mass=MASS, force_limit=self.FORCE,
             position=tuple(ARM.start_pose[0] + self.OFFSET), frequency=self.SERVO.frequency,
             damping_ratio=self.SERVO.damping, material=Material(1.0, restitution=0.0), name="hand",
             group=HAND, mask=OBJECT,
@@ -82,7 +89,7 @@ class ClosedHand:
         moved, end, pressed = path(world, part)
         ahead, speed = self.SERVO.moving(time, substep, velocity, moved, end)
         ahead[:, 2] -= pressed / (MASS * self.SERVO.frequency**2)
-        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed, time)
+        move_set_points(world, (now.position[:, -1] + ahead)[:, None], speed[:, None], time)
 
     def position(self, now: Readout) -> Array:
         """Position [count, 3] m of the end effector."""
@@ -150,7 +157,7 @@ class OpenHand:
         closing = 0.5 * (fingers[:, 0] - fingers[:, 1])
         opening = self.opening(now) + self.SERVO.ahead(time, substep, opening, -closing)
         pads = self.pads(self.position(now) + ahead, opening)
-        move_set_points(world, pads, speed, time)
+        move_set_points(world, pads, speed[:, None], time)
 
     def place(self, world: World, worlds: Array, position: Array) -> None:
         """Tells the arm that hands were moved, see `Arm.place`."""

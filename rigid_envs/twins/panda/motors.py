@@ -26,6 +26,7 @@ SOFTNESS = 1.0 / (SUBSTEP * (SUBSTEP * STIFFNESS + DAMPER))
 # 1/kg, of the rows of friction: motors and friction would contradict each other. Small: at the
 # start of an episode a hand answers an impulse by 1.2 (along x) and 0.8 m/s (along y) per N s
 SLIP = 0.002
+STILL = 1e-3  # m/s, of a tip that friction holds
 NEARBY = 0.03  # m, of a tip that may reach the table in a piece of a step
 
 
@@ -57,8 +58,11 @@ def drive(work):
                 work.gap[lane] -= SUBSTEP * lack[JOINTS]
                 part = 1.0 if work.gap[lane] > 0.0 else PUSHED_OUT
                 lack[JOINTS] -= part * work.gap[lane] / SUBSTEP
+                slip = math.sqrt(lack[JOINTS + 1] ** 2 + lack[JOINTS + 2] ** 2)
                 for r in range(JOINTS + 1, rows):
                     work.high[r] = TABLE_FRICTION * work.pressed[lane]
+                    if slip > STILL:  # along the slip
+                        work.high[r] *= abs(lack[r]) / slip
                     work.low[r] = -work.high[r]
             limit_impulses(work, rows)
             for i in range(JOINTS):

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from physics import Body, Cylinder, Drag, Material, Readout, Scene, World
+from physics import Body, Box, Cylinder, Drag, Material, Readout, Scene, World
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.twins.panda.hand import HAND, OBJECT
+from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand
 from rigid_envs.twins.panda.task import FRICTION, PandaObject, behind, observed
 
 Array = np.ndarray
@@ -15,6 +15,8 @@ RADIUS, HALF_HEIGHT, MASS = 0.03, 0.015, 1.0  # m, m and kg, of the puck
 PUCK_FRICTION = 0.02  # Coulomb's coefficient of puck and table
 DAMPING = 0.04  # 1/s, deceleration per speed that PyBullet adds
 GRAVITY = 9.81  # m/s^2
+# of fingers, half the size: as wide as the slanted ones are at the height of the puck's upper edge
+UPRIGHT = Box((0.0097, 0.0245, 0.025))
 REACH = 0.2  # m along x; beyond it the hand need not follow the puck
 
 
@@ -25,7 +27,8 @@ class PandaSlide(PandaObject):
     """
 
     original = "PandaSlide-v3"
-    bounds = observed(PandaObject.hand, "object")
+    hand = ClosedHand(UPRIGHT)
+    bounds = observed(hand, "object")
     start_height = 2.0 * HALF_HEIGHT
     goal_height = 2.0 * HALF_HEIGHT
     goal_offset = 0.4

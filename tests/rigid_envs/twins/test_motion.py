@@ -5,7 +5,15 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks.twins.recordings import Recording
-from benchmarks.twins.replay import OBJECT, body_errors, hand_errors, replay
+from benchmarks.twins.replay import (
+    FINGERS,
+    OBJECT,
+    PRESSED,
+    body_errors,
+    finger_errors,
+    hand_errors,
+    replay,
+)
 from physics import Box, Drive, Scene, World
 from rigid_envs.twins import TWINS
 from rigid_envs.twins.arms.arm import make_work
@@ -43,6 +51,25 @@ def test_the_table_brakes_a_hand_that_presses_on_it():
     assert np.abs(moved / there - 1.0).max() < 0.15
     # of 4, 8, 20 and 40 mm that are asked for, most is lost where the hand presses hard
     assert there.reshape(4, 5)[0, -1] < 0.5 * there.reshape(4, 5)[0, 0]
+
+
+def test_friction_brakes_a_panda_hand_against_its_slip():
+    recording = Recording.load("panda-presses")
+    errors = hand_errors(recording, replay(recording, TWINS["panda_reach"]()), PRESSED)
+    assert np.median(errors) < 4e-3  # 18 mm if friction along y doesn't know the slip along x
+    assert errors.max() < 8e-3
+
+
+def test_a_hand_that_presses_on_the_table_holds_its_fingers():
+    recording = Recording.load("fetch-grips")
+    found = replay(recording, TWINS["fetch_pick_and_place"]())
+    errors = finger_errors(recording, found)
+    assert np.median(errors) < 2e-3
+    # all were asked to close, and those that pressed stayed open
+    there = recording.observations[-1, :, FINGERS]
+    assert (there < 2e-3).sum() == 5
+    assert (there > 0.03).sum() == 10
+    np.testing.assert_array_equal(found.opening[-1] < 0.02, there < 0.02)
 
 
 def test_a_hand_slides_as_coulomb_says_and_creeps():
