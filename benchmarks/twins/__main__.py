@@ -39,6 +39,8 @@ def main() -> None:
         sliding, creeping, gliding = identify.braking(slides)
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
               f"gliding {gliding:.3f} m/s")  # fmt: skip
+        low, high = identify.glides(slides)
+        print(f"nine of ten glide at {low:.3f} to {high:.3f} m/s")
     elif options.command == "scripts":
         for line in public_scripts.table():
             print(line, flush=True)

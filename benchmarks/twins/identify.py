@@ -98,6 +98,20 @@ def pressing(recording: Recording) -> tuple[float, float, float]:
     return float(sliding), float(creeping), float(sinking)
 
 
+def glides(recording: Recording) -> tuple[float, float]:
+    """5 and 95 % quantiles in m/s of how fast pucks glide at the end of their episode.
+
+    Of those that the hand hasn't been near for 12 steps, and whose speed has changed by less than
+    12 mm/s in the last 8.
+    """
+    hand, puck = recording.observations[..., :3], recording.observations[..., 3:6]
+    speed = np.linalg.norm(np.diff(puck[..., :2], axis=0), axis=2) / FRAME
+    far = (np.linalg.norm((puck - hand)[-12:, :, :2], axis=2) > 0.07).all(axis=0)
+    used = far & (puck[-1, :, 2] > 0.41) & (np.abs(speed[-1] - speed[-9]) < 0.012)
+    low, high = np.quantile(speed[-4:, used].mean(axis=0), (0.05, 0.95))
+    return float(low), float(high)
+
+
 def braking(recording: Recording) -> tuple[float, float, float]:
     """`SLIDING`, `CREEPING` and `GLIDING` of FetchSlide from slides that nothing touches."""
     puck = recording.observations[..., 3:6]

@@ -15,6 +15,7 @@ from rigid_envs.twins.grasping_twin import GraspingTwin
 Array = np.ndarray
 
 HIGHEST = 0.45  # m, of a goal above the table
+# chosen
 CLEAR = 2e-3  # m, of a hand over where it rests on the table
 ABOVE = 0.01  # m, of the grip over the cube's middle, to which the shaped reward leads the hand
 

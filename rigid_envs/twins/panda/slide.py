@@ -15,7 +15,8 @@ RADIUS, HALF_HEIGHT, MASS = 0.03, 0.015, 1.0  # m, m and kg, of the puck
 PUCK_FRICTION = 0.02  # Coulomb's coefficient of puck and table
 DAMPING = 0.04  # 1/s, deceleration per speed that PyBullet adds
 GRAVITY = 9.81  # m/s^2
-# of fingers, half the size: as wide as the slanted ones are at the height of the puck's upper edge
+# m, of fingers, half the size: as wide as the slanted ones at the puck's upper edge, 25 mm above
+# the end effector of a hand on the table: 14.4 + (25 + 7) / 40 * 12.6 = 24.5 mm
 UPRIGHT = Box((0.0097, 0.0245, 0.025))
 REACH = 0.2  # m along x; beyond it the hand need not follow the puck
 

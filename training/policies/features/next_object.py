@@ -1,7 +1,7 @@
 """The next object: the first of several that isn't at its goal yet.
 
 A tower is built from the bottom, and what the hand does depends on the next object alone. A network
-would have to learn for each object anew how it is grasped, and products of "it is next" and what it
+would have to learn for each object how it is grasped, and products of "it is next" and what it
 sees of it. So a layer writes one block for each object, and only that of the next one passes.
 """
 
