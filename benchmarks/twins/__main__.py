@@ -30,16 +30,19 @@ def main() -> None:
     elif options.command == "identify":
         frequency, damping = identify.servo(recordings.Recording.load("fetch-motions"))
         print(f"Fetch hand: frequency {frequency:.1f} rad/s, damping ratio {damping:.2f}")
-        sliding, creeping, sinking = identify.pressing(recordings.Recording.load("fetch-presses"))
+        presses = recordings.Recording.load("fetch-presses")
+        sliding, creeping, sinking, firm = identify.pressing(presses)
         print(f"it presses on the table: sliding {sliding:.2f}, creeping {creeping:.2f}, "
-              f"sinking {sinking:.2f}")  # fmt: skip
+              f"sinking {sinking:.2f} above {1e3 * firm:.1f} mm")  # fmt: skip
         holding, creeping = identify.grips(recordings.Recording.load("fetch-grips"))
         print(f"and then its fingers: holding {holding:.1f}, creeping {creeping:.3f}")
         slides = recordings.Recording.load("fetch-slides")
-        sliding, creeping, gliding = identify.braking(slides)
+        free = identify.Slides.of(slides)
+        sliding, creeping, gliding = free.braking()
         print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
               f"gliding {gliding:.3f} m/s")  # fmt: skip
-        low, high = identify.glides(slides)
+        print(f"its restitution: {identify.restitution(slides):.2f}")
+        low, high = free.glides(sliding, creeping)
         print(f"nine of ten glide at {low:.3f} to {high:.3f} m/s")
     elif options.command == "scripts":
         for line in public_scripts.table():

@@ -1,10 +1,14 @@
-"""What twins take from recorded motions: servo, pressed hands, braking of a puck."""
+"""What twins take from recorded motions: servo, pressed hands, hits and braking of a puck."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
 from benchmarks.twins.recordings import Recording
-from physics import World
+from benchmarks.twins.replay import replay
+from physics import Body, Material, World
 from rigid_envs.twins.fetch import hand as fetch
 from rigid_envs.twins.fetch import slide
 from rigid_envs.twins.fetch.pick_and_place import FetchPickAndPlace
@@ -72,8 +76,8 @@ def grips(recording: Recording) -> tuple[float, float]:
     return float(found[0]), float(found[1])
 
 
-def pressing(recording: Recording) -> tuple[float, float, float]:
-    """`SLIDING`, `CREEPING` and `SINKING` of Fetch hands that press on the table.
+def pressing(recording: Recording) -> tuple[float, float, float, float]:
+    """`SLIDING`, `CREEPING`, `SINKING` and `FIRM` of Fetch hands that press on the table.
 
     From their last steps.
     """
@@ -90,42 +94,101 @@ def pressing(recording: Recording) -> tuple[float, float, float]:
     kept = (after - before)[:, 1] / free[:, 1]
 
     def lack(parameters: Array) -> Array:
-        return np.asarray(fetch.braked(before[:, 2], free, *parameters) - kept)
+        return np.asarray(fetch.braked(before[:, 2], free, *parameters)[:, 1] - kept)
 
     sliding, creeping = least_squares(lack, (1.0, 0.5)).x
-    below = np.maximum(fetch.RESTING - before[:, 2] - free[:, 2], 0.0)
-    sinking = below @ (fetch.RESTING - after[:, 2]) / (below @ below)
-    return float(sliding), float(creeping), float(sinking)
+    height = np.maximum(before[:, 2], fetch.RESTING)
+    below = np.maximum(fetch.RESTING - height - free[:, 2], 0.0)
+
+    def deeper(parameters: Array) -> Array:
+        return np.asarray(1e3 * (fetch.sunk(below, *parameters) - fetch.RESTING + after[:, 2]))
+
+    sinking, firm = least_squares(deeper, (0.1, 3e-3)).x
+    return float(sliding), float(creeping), float(sinking), float(firm)
 
 
-def glides(recording: Recording) -> tuple[float, float]:
-    """5 and 95 % quantiles in m/s of how fast pucks glide at the end of their episode.
+class FetchSlideWith(slide.FetchSlide):
+    """FetchSlide with another restitution of the puck."""
 
-    Of those that the hand hasn't been near for 12 steps, and whose speed has changed by less than
-    12 mm/s in the last 8.
+    def __init__(self, restitution: float) -> None:
+        super().__init__()
+        self._material = Material(1.0, restitution)
+
+    def object(self) -> Body:
+        return replace(super().object(), material=self._material)
+
+
+def restitution(recording: Recording) -> float:
+    """`RESTITUTION` of FetchSlide's puck, with which it is as fast as there when it is hit.
+
+    In the median of the ratios of the largest speeds, at `balanced`.
     """
-    hand, puck = recording.observations[..., :3], recording.observations[..., 3:6]
-    speed = np.linalg.norm(np.diff(puck[..., :2], axis=0), axis=2) / FRAME
-    far = (np.linalg.norm((puck - hand)[-12:, :, :2], axis=2) > 0.07).all(axis=0)
-    used = far & (puck[-1, :, 2] > 0.41) & (np.abs(speed[-1] - speed[-9]) < 0.012)
-    low, high = np.quantile(speed[-4:, used].mean(axis=0), (0.05, 0.95))
-    return float(low), float(high)
+
+    def fastest(path: Array) -> Array:
+        speed = np.linalg.norm(np.diff(path[..., :2], axis=0), axis=2) / FRAME
+        return np.asarray(speed.max(axis=0))
+
+    there, tried, ratios = fastest(recording.observations[..., 3:6]), np.linspace(0.0, 0.8, 9), []
+    for e in tried:
+        ratios.append(np.median(fastest(replay(recording, FetchSlideWith(e)).body) / there))
+    return float(np.interp(1.0, ratios, tried))
 
 
-def braking(recording: Recording) -> tuple[float, float, float]:
-    """`SLIDING`, `CREEPING` and `GLIDING` of FetchSlide from slides that nothing touches."""
-    puck = recording.observations[..., 3:6]
-    hand = recording.observations[..., :3]
-    velocity = (recording.observations[..., 14:17] + recording.observations[..., 20:23]) / FRAME
-    free = (np.linalg.norm((puck - hand)[..., :2], axis=-1) > 0.07) & (puck[..., 2] > 0.41)
-    used = free[:-1] & free[1:] & (np.linalg.norm(velocity[:-1, :, :2], axis=-1) > 0.02)
-    before, after = velocity[:-1, :, :2][used], velocity[1:, :, :2][used]
+class Slides(NamedTuple):
+    """Pucks from where the hand has left them to the end of their episode.
 
-    def lack(parameters: Array) -> float:
-        v = before
-        for _ in range(4):
-            v = v + 0.25 * FRAME * slide.braking(v, *parameters)
-        return float(np.abs(v - after).mean())
+    Attributes:
+        position: [n, 2] m, at the start.
+        velocity: [n, 2] m/s, at the start.
+        steps: [n], left in the episode.
+        end: [n, 2] m, where they are then.
+    """
 
-    found = minimize(lack, (1.0, 5.0, 0.05), method="Nelder-Mead").x
-    return float(found[0]), float(found[1]), float(found[2])
+    position: Array
+    velocity: Array
+    steps: Array
+    end: Array
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Slides":
+        """Those of a recording that are on the table and faster than 0.3 m/s."""
+        hand, puck = recording.observations[..., :3], recording.observations[..., 3:6]
+        velocity = recording.observations[..., 14:17] + recording.observations[..., 20:23]
+        near = np.linalg.norm((puck - hand)[..., :2], axis=-1) < 0.075
+        last = len(near) - 1
+        start = np.minimum(last - np.argmax(near[::-1], axis=0) + 2, last)
+        episodes = np.arange(len(start))
+        v = velocity[start, episodes, :2] / FRAME
+        used = (start < last - 14) & (puck[-1, :, 2] > 0.41) & (np.linalg.norm(v, axis=1) > 0.3)
+        return cls(puck[start, episodes, :2][used], v[used], (last - start)[used],
+                   puck[-1, used, :2])  # fmt: skip
+
+    def miss(self, sliding: float, creeping: float, gliding: Any) -> Array:
+        """How far [n, 2] m beyond its end a law has each puck; as the twin, a frame at a time."""
+        position, velocity = self.position, self.velocity
+        for step in range(self.steps.max()):
+            after = velocity + FRAME * slide.braking(velocity, sliding, creeping, gliding)
+            moving = (step < self.steps)[:, None]
+            position = position + np.where(moving, 0.5 * FRAME * (velocity + after), 0.0)
+            velocity = after
+        return position - self.end
+
+    def braking(self) -> tuple[float, float, float]:
+        """`SLIDING`, `CREEPING` and a `GLIDING` with which all are nearest to their end."""
+
+        def lack(parameters: Array) -> float:
+            sliding, creeping, gliding = parameters
+            miss = self.miss(sliding, creeping, max(gliding, 0.0))
+            return float(np.linalg.norm(miss, axis=1).mean())
+
+        found = minimize(lack, (1.0, 7.0, 0.03), method="Nelder-Mead").x
+        return float(found[0]), float(found[1]), float(found[2])
+
+    def glides(self, sliding: float, creeping: float) -> tuple[float, float]:
+        """5 and 95 % quantiles of the speeds in m/s of gliding, one for each puck."""
+        direction = self.velocity / np.linalg.norm(self.velocity, axis=1, keepdims=True)
+        tried = np.linspace(0.0, 0.12, 49)
+        along = [np.sum(self.miss(sliding, creeping, g) * direction, axis=1) for g in tried]
+        each = [np.interp(0.0, row, tried) for row in np.array(along).T]
+        low, high = np.quantile(each, (0.05, 0.95))
+        return float(low), float(high)

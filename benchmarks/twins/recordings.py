@@ -73,7 +73,7 @@ KINDS = {
         "FetchPush-v4", 50, 49,
         lambda n, size: scripts.pushing(n, size, 3, 0.5, 0.418, 0.075, 0.03, 0),
     ),
-    "fetch-slides": Kind("FetchSlide-v4", 50, 49, lambda n, size: scripts.hitting(n, size, 3, 0)),
+    "fetch-slides": Kind("FetchSlide-v4", 100, 49, lambda n, size: scripts.hitting(n, size, 3, 0)),
     "panda-axes": Kind("PandaReach-v3", 6, 12, scripts.along_axes),
     "panda-motions": Kind(
         "PandaReach-v3", 20, 49,

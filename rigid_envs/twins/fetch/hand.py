@@ -13,6 +13,7 @@ import numpy as np
 
 from physics import Box, Drive, Gripper, Material, Readout, World
 from rigid_envs.twins.arms.arm import Arm
+from rigid_envs.twins.fetch.pyramid import friction
 from rigid_envs.twins.servo import Servo, move_set_points
 
 Array = np.ndarray
@@ -23,10 +24,12 @@ STRIDE = 0.05  # m, displacement along each axis that an action asks for
 # identified
 SERVO = Servo(55.8, 1.09)
 RESTING = 0.4195  # m, height of a hand that rests on the table
+CLEAR = 2e-3  # m, chosen: a hand that is so far above it doesn't press
 # of a hand that presses on the table: loss of displacement along the table per lack of displacement
 # downwards where it slides, and the part that is lost where it creeps
-SLIDING, CREEPING = 0.95, 0.54
-SINKING = 0.11  # m that a hand on the table sinks per m of displacement that it lacks downwards
+SLIDING, CREEPING = 0.94, 0.53
+# a hand on the table sinks by so many m per m of displacement that it lacks downwards beyond FIRM m
+SINKING, FIRM = 0.16, 5.7e-3
 # friction holds fingers of a hand that presses: up to so many m from their set point per m of
 # displacement that it lacks downwards. Held ones creep by this part of the distance in a step
 HOLDING, FINGER_CREEPING = 2.8, 0.012
@@ -188,13 +191,41 @@ def _follow(
     position, velocity = hand.position(now), hand.velocity(now).astype(float)
     free = hand.arm.respond(world, position, velocity, STRIDE * actions[:, :3], frame)
     moved, end = free.moved[:, 0], free.end[:, 0]
-    kept = braked(position[:, 2], moved)[:, None]
+    kept = braked(position[:, 2], moved)
     moved[:, :2] *= kept
     end[:, :2] *= kept
-    below = np.maximum(RESTING - position[:, 2] - moved[:, 2], 0.0)
-    moved[:, 2] += (1.0 - SINKING) * below
+    out, below = lifted(position[:, 2], moved[:, 2])
+    moved[:, 2] += out + below - sunk(below)
     end[:, 2] = np.where(below > 0.0, 0.0, end[:, 2])
     return *SERVO.moving(frame, world.fidelity.substep, velocity, moved, end), below
+
+
+def lifted(height: Array, rising: Array) -> tuple[Array, Array]:
+    """How far the table pushes out hands that begin in it, and what it denies to those that sink.
+
+    A hand that rises leaves the table sooner. How much sooner fits the first steps of FetchSlide.
+
+    Args:
+        height: [n] m, of the hands.
+        rising: [n] m, displacement upwards in a step of hands that meet no table.
+
+    Returns:
+        [n] m and [n] m.
+    """
+    deep = np.maximum(RESTING - height, 0.0)
+    out = deep * np.exp(-0.5 * np.maximum(rising, 0.0) / np.maximum(deep, 1e-9))
+    return out, np.maximum(RESTING - np.maximum(height, RESTING) - rising, 0.0)
+
+
+def sunk(below: Array, sinking: float = SINKING, firm: float = FIRM) -> Array:
+    """How deep [n] m hands sink into the table.
+
+    Args:
+        below: [n] m, which displacement downwards they lack because of it.
+        sinking: see `SINKING`.
+        firm: m, see `FIRM`.
+    """
+    return sinking * np.maximum(below - firm, 0.0)
 
 
 def fingers_move(
@@ -224,7 +255,7 @@ def fingers_move(
 def braked(
     height: Array, moved: Array, sliding: float = SLIDING, creeping: float = CREEPING
 ) -> Array:
-    """Which part [n] of a displacement along the table is left to hands that press on it.
+    """Which part [n, 2] of a displacement along x and y is left to hands that press on the table.
 
     Args:
         height: [n] m, of the hands.
@@ -232,7 +263,10 @@ def braked(
         sliding: see `SLIDING`.
         creeping: see `CREEPING`.
     """
-    along = np.sqrt(np.sum(moved[:, :2] ** 2, axis=1)) + 1e-9
-    below = np.maximum(RESTING - np.maximum(height, RESTING) - moved[:, 2], 0.0) + 1e-9
-    loss = 1.0 / np.sqrt((creeping * along) ** -2 + (sliding * below) ** -2)
-    return np.asarray(1.0 - loss / along)
+    along = moved[:, :2] + 1e-9
+    out, below = lifted(height, moved[:, 2])
+    pressed = sliding * (out + below + 1e-9)
+    loss = friction(along, pressed[:, None], creeping)
+    size = np.abs(loss).sum(axis=1, keepdims=True)
+    most = 1.0 / np.sqrt((creeping * np.abs(along).sum(axis=1)) ** -2 + pressed**-2)
+    return 1.0 + loss / size * most[:, None] / along

@@ -7,7 +7,7 @@ import numpy as np
 from physics import Body, Readout, World
 from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
 from rigid_envs.twins.fetch.arm import HIGH
-from rigid_envs.twins.fetch.hand import RESTING, OpenHand
+from rigid_envs.twins.fetch.hand import CLEAR, RESTING, OpenHand
 from rigid_envs.twins.fetch.push import HALF, cube
 from rigid_envs.twins.fetch.task import FetchObject
 from rigid_envs.twins.grasping_twin import GraspingTwin
@@ -15,9 +15,7 @@ from rigid_envs.twins.grasping_twin import GraspingTwin
 Array = np.ndarray
 
 HIGHEST = 0.45  # m, of a goal above the table
-# chosen
-CLEAR = 2e-3  # m, of a hand over where it rests on the table
-ABOVE = 0.01  # m, of the grip over the cube's middle, to which the shaped reward leads the hand
+ABOVE = 0.01  # m, chosen, of the grip over the cube's middle, where the shaped reward leads it
 
 
 class FetchPickAndPlace(FetchObject, GraspingTwin):

@@ -12,7 +12,8 @@ import numpy as np
 from physics import Body, Cylinder, Material, Readout, World
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.fetch.arm import FAR
-from rigid_envs.twins.fetch.hand import HAND, OBJECT, ClosedHand
+from rigid_envs.twins.fetch.hand import CLEAR, HAND, OBJECT, RESTING, ClosedHand
+from rigid_envs.twins.fetch.pyramid import friction
 from rigid_envs.twins.fetch.task import FetchObject
 
 Array = np.ndarray
@@ -21,13 +22,15 @@ RADIUS, HALF_HEIGHT, MASS = 0.025, 0.02, 2.0  # m, m and kg, of the puck
 REACH = 0.4  # m along x from the hand's start; beyond it the hand can't follow the puck
 
 # identified by `python -m benchmarks.twins identify`
-SLIDING = 0.98  # m/s^2, largest sum of the decelerations along x and y
-CREEPING = 5.12  # 1/s, deceleration of a slow puck per speed above that at which it glides
-GLIDING = 0.041  # m/s, on average
-GLIDES = 0.034  # m/s, largest difference from that average in an episode
+SLIDING = 1.0  # m/s^2, largest sum of the decelerations along x and y
+CREEPING = 6.35  # 1/s, deceleration of a slow puck per speed above that at which it glides
+GLIDING = 0.033  # m/s, on average
+GLIDES = 0.028  # m/s, largest difference from that average in an episode
+RESTITUTION = 0.37  # of the puck, chosen: see docs/twins.md
 
-# of the prediction where a puck will be: most episodes end that long after the hit
-_STEP, _STEPS = 0.1, 12  # s
+LENGTH = 50  # steps of an episode
+ABOVE = 6e-3  # m, chosen, of the hand that is led to the puck over one that rests on the table
+_STEPS = 25  # in which the motion of a puck to the end of its episode is computed
 
 
 class FetchSlide(FetchObject):
@@ -43,13 +46,13 @@ class FetchSlide(FetchObject):
     ground = start_height - HALF_HEIGHT
     ground_friction = 0.0  # see `braking`
     draw_count = FetchObject.draw_count + 1
-    shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0}
+    shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0, "table": 0.5}
 
     def object(self) -> Body:
         """The puck."""
         return Body(
             Cylinder(RADIUS, HALF_HEIGHT), mass=MASS, position=(0.9, 0.75, self.start_height),
-            material=Material(friction=1.0, restitution=0.0), name="puck",
+            material=Material(1.0, RESTITUTION), name="puck",
             group=OBJECT, mask=OBJECT | HAND,
         )  # fmt: skip
 
@@ -62,6 +65,7 @@ class FetchSlide(FetchObject):
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis; the table brakes the puck."""
         super().act(world, now, actions)
+        world.memory("step", 1)[:] += 1.0
         force = np.zeros((world.count, 3))
         gliding = GLIDING + world.memory("glide", 1)
         force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2], gliding=gliding)
@@ -70,20 +74,27 @@ class FetchSlide(FetchObject):
     def guidance(
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
-        """`aim`: minus the distance in m from the goal to the place where the puck will be.
+        """`aim`: minus the distance in m from the goal to where the puck will be after 50 steps.
 
-        `hit`: 1 where it will be at the goal, falling to 1/e at 5 cm.
+        `hit`: 1 where it will be at the goal then, falling to 1/e at 5 cm.
 
-        `reach`: as in the other tasks, until the puck is out of reach.
+        `reach`: minus the distance in m from the hand to a place 5 cm behind the puck, as seen from
+        the goal, and above the table, until the puck is out of reach.
+
+        `table`: -1 where the hand is on the table, whose friction would hold it.
         """
         end = np.array(achieved, dtype=float)
+        left = self.frame * np.maximum(LENGTH - world.memory("step", 1), 0.0)
         gliding = GLIDING + world.memory("glide", 1)
-        end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2], gliding)
-        reach = super().guidance(world, now, achieved, desired, goal_distance)["reach"]
+        end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2], left, gliding)
+        above = achieved + np.array([0.0, 0.0, RESTING + ABOVE - self.start_height])
+        reach = super().guidance(world, now, above, desired, goal_distance)["reach"]
+        low = self.hand.position(now)[:, 2] < RESTING + CLEAR
         gone = achieved[:, 0] > self.hand.start[0] + REACH
         miss = distance(end, desired)
         hit = np.exp(-((miss / self.threshold) ** 2))
-        return {"hit": hit, "aim": -miss, "reach": np.where(gone, 0.0, reach)}
+        reach = np.where(gone, 0.0, reach)
+        return {"hit": hit, "aim": -miss, "reach": reach, "table": -low.astype(float)}
 
 
 def braking(
@@ -94,8 +105,7 @@ def braking(
 ) -> Array:
     """Acceleration [n, 2] m/s^2 of a puck that slides with a velocity [n, 2] m/s.
 
-    Of those that the pyramid allows, |x| + |y| <= sliding, the one nearest to that of a creeping
-    puck, -creeping v (1 - gliding / |v|).
+    A slow puck creeps, braked by creeping (v - gliding v / |v|).
 
     Args:
         velocity: [n, 2] m/s.
@@ -104,24 +114,25 @@ def braking(
         gliding: m/s, at which it glides on; one number, or [n, 1].
     """
     speed = np.sqrt(np.sum(velocity.astype(float) ** 2, axis=1, keepdims=True))
-    above = 1.0 - gliding / np.maximum(speed, gliding)
-    wanted = creeping * above * np.abs(velocity)
-    excess = np.maximum(wanted.sum(axis=1, keepdims=True) - sliding, 0.0)
-    nearest = np.minimum(np.maximum(wanted - 0.5 * excess, 0.0), sliding)
-    return -np.sign(velocity) * nearest
+    slip = velocity * (1.0 - gliding / np.maximum(speed, gliding))
+    return friction(slip, sliding, creeping)
 
 
-def predicted(position: Array, velocity: Array, gliding: Array | float = GLIDING) -> Array:
-    """Where [n, 2] m a puck at a position [n, 2] m with a velocity [n, 2] m/s will be.
+def predicted(
+    position: Array, velocity: Array, duration: Array | float, gliding: Array | float = GLIDING
+) -> Array:
+    """Where [n, 2] m a puck that nothing touches will be.
 
     Args:
         position: [n, 2] m.
         velocity: [n, 2] m/s.
+        duration: s, one number, or [n, 1].
         gliding: see `braking`.
     """
+    step = duration / _STEPS
     velocity = velocity.astype(float)
     for _ in range(_STEPS):
-        after = velocity + _STEP * braking(velocity, gliding=gliding)
-        position = position + 0.5 * _STEP * (velocity + after)
+        after = velocity + step * braking(velocity, gliding=gliding)
+        position = position + 0.5 * step * (velocity + after)
         velocity = after
     return position

@@ -22,7 +22,6 @@ from rigid_envs.twins.arms.work import JOINTS
 from rigid_envs.twins.fetch.hand import CREEPING as HAND_CREEPING
 from rigid_envs.twins.fetch.hand import RESTING, braked
 from rigid_envs.twins.fetch.hand import SLIDING as HAND_SLIDING
-from rigid_envs.twins.fetch.slide import CREEPING, GLIDING, SLIDING, braking, predicted
 from rigid_envs.twins.fetch.task import rotation as fetch_rotation
 from rigid_envs.twins.panda import inverse_kinematics
 from rigid_envs.twins.panda.arm import CHAIN, NEUTRAL
@@ -74,14 +73,23 @@ def test_a_hand_that_presses_on_the_table_holds_its_fingers():
 
 def test_a_hand_slides_as_coulomb_says_and_creeps():
     free = np.array([[0.03, 0.0, -1e-4], [0.0, 1e-4, -0.02], [0.03, 0.0, 0.01], [0.02, 0.0, -0.02]])
-    lost = (1.0 - braked(np.full(4, RESTING), free)) * np.linalg.norm(free[:, :2], axis=1)
-    assert lost[0] == pytest.approx(HAND_SLIDING * 1e-4, rel=1e-3)
-    assert lost[1] == pytest.approx(HAND_CREEPING * 1e-4, rel=1e-3)
-    assert lost[2] == pytest.approx(0.0, abs=1e-8)  # it rises
+    lost = (1.0 - braked(np.full(4, RESTING), free)) * np.abs(free[:, :2])
+    assert lost[0] == pytest.approx([HAND_SLIDING * 1e-4, 0.0], rel=1e-3, abs=1e-8)
+    assert lost[1] == pytest.approx([0.0, HAND_CREEPING * 1e-4], rel=1e-3, abs=1e-8)
+    assert lost[2] == pytest.approx([0.0, 0.0], abs=1e-8)  # it rises
     # a hand 2 cm above the table presses by nothing, one 1 cm above it by half as much
     kept = braked(np.array([RESTING + 0.02, RESTING + 0.01]), free[[3, 3]])
-    assert kept[0] == pytest.approx(1.0, abs=1e-6)
-    assert kept[1] < 0.8
+    assert kept[0] == pytest.approx([1.0, 1.0], abs=1e-6)
+    assert kept[1, 0] < 0.8
+
+
+def test_friction_of_the_fetch_hand_is_that_of_a_pyramid():
+    # as the table pushes the hand out in the first step of FetchSlide, it brakes it
+    recording = Recording.load("fetch-slides")
+    found = replay(recording, TWINS["fetch_slide"]())
+    errors = found.hand[3] - recording.observations[3, :, :3]
+    assert np.median(np.linalg.norm(errors, axis=1)) < 1.5e-3
+    assert np.abs(errors).max() < 4e-3  # 8 mm without this law
 
 
 def test_a_stretched_arm_gets_no_farther():
@@ -101,7 +109,7 @@ def test_a_stretched_arm_gets_no_farther():
 
 def test_fetch_pushes_a_cube_to_where_the_original_does():
     recording = Recording.load("fetch-pushes")
-    found = replay(recording, TWINS["fetch_push"](), "accurate")
+    found = replay(recording, TWINS["fetch_push"](), "solid")
     assert np.median(body_errors(recording, found, OBJECT["fetch"])) < 0.01
 
 
@@ -133,23 +141,16 @@ def test_a_servo_of_the_engine_follows_the_formula(frequency, damping):
     assert [position - 0.05, rate] == pytest.approx(exact @ [-0.05, 0.3])
 
 
-def test_friction_of_the_puck_is_that_of_a_pyramid():
-    fast = np.array([[1.0, 0.0], [0.0, -1.0], [0.8, 0.8], [1.2, 0.3]])
-    found = braking(fast)
-    assert np.abs(found).sum(axis=1) == pytest.approx(np.full(4, SLIDING))
-    assert found[2] == pytest.approx([-0.5 * SLIDING, -0.5 * SLIDING])
-    assert found[3] == pytest.approx([-SLIDING, 0.0])  # the faster component first
-    slow = np.array([[GLIDING, 0.0], [0.0, 0.5 * GLIDING], [0.0, 0.0]])
-    assert braking(slow) == pytest.approx(np.zeros((3, 2)))  # it glides on, or rests
-    # along an axis: with the largest deceleration to the speed c from which it creeps, v' = -k (v -
-    # g), and at last it glides; 1.2 s in all
-    v, a, k, g = 1.0, SLIDING, CREEPING, GLIDING
-    c = g + a / k
-    left = 1.2 - (v - c) / a
-    far = (v * v - c * c) / (2.0 * a) + g * left + (c - g) / k * (1.0 - np.exp(-k * left))
-    assert predicted(np.zeros((1, 2)), np.array([[v, 0.0]]))[0] == pytest.approx(
-        [far, 0.0], rel=0.05
+def test_a_puck_that_is_hit_is_as_fast_as_in_the_original():
+    recording = Recording.load("fetch-slides")
+    found = replay(recording, TWINS["fetch_slide"]())
+    there, here = (
+        np.linalg.norm(np.diff(path[..., :2], axis=0), axis=2).max(axis=0)
+        for path in (recording.observations[..., 3:6], found.body)
     )
+    # see docs/twins.md: slower than here in hits like these, faster in those of policies
+    assert np.median(here / there) == pytest.approx(0.92, abs=0.05)
+    assert np.quantile(np.abs(here / there - 1.0), 0.75) < 0.2
 
 
 def test_angles_are_those_of_the_originals():
