@@ -29,7 +29,8 @@ GLIDES = 0.028  # m/s, largest difference from that average in an episode
 RESTITUTION = 0.37  # of the puck, chosen: see docs/twins.md
 
 LENGTH = 50  # steps of an episode
-ABOVE = 6e-3  # m, chosen, of the hand that is led to the puck over one that rests on the table
+# m, chosen, over a hand that rests on the table: of one that is led to the puck, and at most
+ABOVE, HIGH = 6e-3, 0.015
 _STEPS = 25  # in which the motion of a puck to the end of its episode is computed
 
 
@@ -46,7 +47,7 @@ class FetchSlide(FetchObject):
     ground = start_height - HALF_HEIGHT
     ground_friction = 0.0  # see `braking`
     draw_count = FetchObject.draw_count + 1
-    shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0, "table": 0.5}
+    shaping = {"hit": 3.0, "aim": 5.0, "reach": 1.0, "height": 0.5}
 
     def object(self) -> Body:
         """The puck."""
@@ -81,7 +82,8 @@ class FetchSlide(FetchObject):
         `reach`: minus the distance in m from the hand to a place 5 cm behind the puck, as seen from
         the goal, and above the table, until the puck is out of reach.
 
-        `table`: -1 where the hand is on the table, whose friction would hold it.
+        `height`: -1 where the hand is on the table, whose friction would hold it, or so high that it
+        would hit the puck's edge.
         """
         end = np.array(achieved, dtype=float)
         left = self.frame * np.maximum(LENGTH - world.memory("step", 1), 0.0)
@@ -89,12 +91,13 @@ class FetchSlide(FetchObject):
         end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2], left, gliding)
         above = achieved + np.array([0.0, 0.0, RESTING + ABOVE - self.start_height])
         reach = super().guidance(world, now, above, desired, goal_distance)["reach"]
-        low = self.hand.position(now)[:, 2] < RESTING + CLEAR
+        height = self.hand.position(now)[:, 2] - RESTING
+        wrong = (height < CLEAR) | (height > HIGH)
         gone = achieved[:, 0] > self.hand.start[0] + REACH
         miss = distance(end, desired)
         hit = np.exp(-((miss / self.threshold) ** 2))
         reach = np.where(gone, 0.0, reach)
-        return {"hit": hit, "aim": -miss, "reach": reach, "table": -low.astype(float)}
+        return {"hit": hit, "aim": -miss, "reach": reach, "height": -wrong.astype(float)}
 
 
 def braking(
