@@ -82,8 +82,8 @@ class FetchSlide(FetchObject):
         `reach`: minus the distance in m from the hand to a place 5 cm behind the puck, as seen from
         the goal, and above the table, until the puck is out of reach.
 
-        `height`: -1 where the hand is on the table, whose friction would hold it, or so high that it
-        would hit the puck's edge.
+        `height`: -1 where the hand is on the table, whose friction would hold it, or so high that
+        it would hit the puck's edge.
         """
         end = np.array(achieved, dtype=float)
         left = self.frame * np.maximum(LENGTH - world.memory("step", 1), 0.0)
