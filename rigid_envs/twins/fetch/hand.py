@@ -27,7 +27,7 @@ RESTING = 0.4195  # m, height of a hand that rests on the table
 CLEAR = 2e-3  # m, chosen: a hand that is so far above it doesn't press
 # of a hand that presses on the table: loss of displacement along the table per lack of displacement
 # downwards where it slides, and the part that is lost where it creeps
-SLIDING, CREEPING = 0.94, 0.53
+SLIDING, CREEPING = 0.96, 0.54
 # a hand on the table sinks by so many m per m of displacement that it lacks downwards beyond FIRM m
 SINKING, FIRM = 0.16, 5.7e-3
 # friction holds fingers of a hand that presses: up to so many m from their set point per m of

@@ -26,9 +26,8 @@ SLIDING = 1.0  # m/s^2, largest sum of the decelerations along x and y
 CREEPING = 6.35  # 1/s, deceleration of a slow puck per speed above that at which it glides
 GLIDING = 0.033  # m/s, on average
 GLIDES = 0.028  # m/s, largest difference from that average in an episode
-RESTITUTION = 0.37  # of the puck, chosen: see docs/twins.md
 
-LENGTH = 50  # steps of an episode
+RESTITUTION = 0.37  # of the puck; chosen, see docs/twins.md
 # m, chosen, over a hand that rests on the table: of one that is led to the puck, and at most
 ABOVE, HIGH = 6e-3, 0.015
 _STEPS = 25  # in which the motion of a puck to the end of its episode is computed
@@ -66,7 +65,6 @@ class FetchSlide(FetchObject):
     def act(self, world: World, now: Readout, actions: Array) -> None:
         """Moves the hand by up to 5 cm along each axis; the table brakes the puck."""
         super().act(world, now, actions)
-        world.memory("step", 1)[:] += 1.0
         force = np.zeros((world.count, 3))
         gliding = GLIDING + world.memory("glide", 1)
         force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2], gliding=gliding)
@@ -86,7 +84,7 @@ class FetchSlide(FetchObject):
         it would hit the puck's edge.
         """
         end = np.array(achieved, dtype=float)
-        left = self.frame * np.maximum(LENGTH - world.memory("step", 1), 0.0)
+        left = np.maximum(self.frame * self.max_episode_steps - world.time[:, None], 0.0)
         gliding = GLIDING + world.memory("glide", 1)
         end[:, :2] = predicted(end[:, :2], now.linear_velocity[:, 0, :2], left, gliding)
         above = achieved + np.array([0.0, 0.0, RESTING + ABOVE - self.start_height])

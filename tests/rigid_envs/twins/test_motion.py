@@ -148,7 +148,7 @@ def test_a_puck_that_is_hit_is_as_fast_as_in_the_original():
         np.linalg.norm(np.diff(path[..., :2], axis=0), axis=2).max(axis=0)
         for path in (recording.observations[..., 3:6], found.body)
     )
-    # see docs/twins.md: slower than here in hits like these, faster in those of policies
+    # slower than there in these hits, but not in those of policies, see docs/twins.md
     assert np.median(here / there) == pytest.approx(0.92, abs=0.05)
     assert np.quantile(np.abs(here / there - 1.0), 0.75) < 0.2
 
