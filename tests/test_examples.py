@@ -76,3 +76,12 @@ def test_the_notebook_runs_from_top_to_bottom_in_any_folder(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "solved: True" in done.stdout
+
+
+def test_tqc_learns_from_hindsight_for_a_few_updates(capsys):
+    example = runpy.run_path(str(EXAMPLES / "tqc_panda_push.py"))
+    rate = example["main"](
+        ["--env", "RigidEnvs/PandaReach-v0", "--steps", "3200", "--every", "1600"]
+    )
+    assert 0.0 <= rate <= 1.0
+    assert capsys.readouterr().out.count("solved") == 2

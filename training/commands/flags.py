@@ -300,7 +300,7 @@ def add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="write nothing; fail if docs/results.md or README.md is out of date",
+        help="write nothing; fail if docs/results.md, docs/twins.md or README.md is out of date",
     )
     parser.add_argument(
         "--repository",

@@ -24,7 +24,7 @@ from training.settings.config import TrainConfig
 from training.settings.config_file import load_config
 from training.settings.environments import task_of
 from training.settings.errors import UsageError
-from training.settings.seed_ranges import EVALUATION
+from training.settings.seed_ranges import EVALUATION, ORIGINAL
 from training.settings.tasks import task_name
 
 MAX_FILE_BYTES = 300_000
@@ -107,11 +107,11 @@ def _in_original(policy: Policy, episodes: int) -> dict[str, Any] | None:
     twin = TWINS.get(task_of(policy.env_id) or "")
     if twin is None:
         return None
-    there, outcome, versions = evaluate_original(policy, twin.original, episodes, seed=EVALUATION)
+    there, outcome, versions = evaluate_original(policy, twin.original, episodes, seed=ORIGINAL)
     return {
         "env_id": there.env_id,
         "episodes": episodes,
-        "first_seed": EVALUATION,
+        "first_seed": ORIGINAL,
         "success_at_end": _rate(outcome.success_at_end),
         "versions": versions,
     }

@@ -51,14 +51,16 @@ def readme_table(results: Sequence[Result]) -> str:
 def twins_table(results: Sequence[Result]) -> str:
     """The table of twins: training, success here and in their originals."""
     lines = [
-        "| twin | seeds | steps | training time | success here | in the original | least there |",
-        "|---|---:|---:|---:|---:|---:|---:|",
+        "| twin | algorithm | seeds | steps | training time | success here | in the original "
+        "| least there |",
+        "|---|---|---:|---:|---:|---:|---:|---:|",
     ]
     for group in by_kind(results):
         cells = [
             f"{group[0].env_id.removeprefix('RigidEnvs/').removesuffix('-v0')}",
+            group[0].algorithm.upper(),
             str(len(group)),
-            f"{group[0].steps / 1e6:.3g} M",
+            f"{statistics.fmean(one.steps for one in group) / 1e6:.2g} M",
             over_seeds(group, lambda one: one.seconds, "{:.0f}", " s"),
             over_seeds(group, lambda one: 100 * one.success_at_end["rate"], "{:.1f}", " %"),
             over_seeds(group, success_in_original, "{:.1f}", " %"),

@@ -19,7 +19,7 @@ from training.runs.run_folder import RunFolder
 from training.sb3.model_state import read_state
 from training.settings.config_file import load_config
 from training.settings.errors import UsageError
-from training.settings.seed_ranges import EVALUATION
+from training.settings.seed_ranges import EVALUATION, ORIGINAL
 
 
 def test_a_twins_policy_is_evaluated_in_its_original(monkeypatch):
@@ -27,13 +27,13 @@ def test_a_twins_policy_is_evaluated_in_its_original(monkeypatch):
     outcome.success_at_end[:3] = 1.0
 
     def play(policy, env_id, episodes, *, seed):
-        assert (env_id, episodes, seed) == ("PandaPush-v3", 10, EVALUATION)
+        assert (env_id, episodes, seed) == ("PandaPush-v3", 10, ORIGINAL)
         return replace(policy, env_id=env_id), outcome, {"pybullet": "3.2.7"}
 
     monkeypatch.setattr("training.results.record_run.evaluate_original", play)
     policy = Policy(lambda observation: np.zeros((1, 3)), "RigidEnvs/PandaPushDense-v0", "still")
     found = _in_original(policy, 10)
-    assert found["env_id"] == "PandaPush-v3"
+    assert (found["env_id"], found["first_seed"]) == ("PandaPush-v3", ORIGINAL)
     assert found["versions"] == {"pybullet": "3.2.7"}
     assert found["success_at_end"]["rate"] == 0.3
     assert _in_original(replace(policy, env_id="RigidEnvs/Push-v0"), 10) is None

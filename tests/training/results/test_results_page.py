@@ -90,7 +90,7 @@ def test_twins_have_their_own_table_with_success_in_their_originals():
     assert readme_text(empty, [given, *twins]) == readme_text(empty, [given])
     assert "No run is recorded" in twins_text(empty, [given])
     table = twins_text(empty, [given, *twins])
-    assert "\n| FetchPush | 2 | 1 M | " in table
+    assert "\n| FetchPush | PPO | 2 | 1 M | " in table
     assert table.splitlines()[-2].endswith("| 93.0 ± 4.2 % | 90.0 % |")
     section = _section(twins, load_config("ppo", given.env_id))
     assert "| at any time | in FetchPush-v4 | commit |" in section
