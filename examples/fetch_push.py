@@ -1,7 +1,7 @@
 """A policy that was trained in the twin acts in a script of FetchPush.
 
 rigid-envs train --algo ppo --env RigidEnvs/FetchPush-v0 && rigid-envs export -o push.safetensors
-pip install "gymnasium-robotics==1.4.2" "mujoco==3.2.7" safetensors
+pip install -e ".[train]" "gymnasium-robotics==1.4.2" "mujoco==3.2.7"
 python examples/fetch_push.py push.safetensors
 """
 

@@ -69,10 +69,12 @@ def main(arguments: list[str] | None = None) -> float:
         policy_kwargs={"net_arch": [128, 128]},
         seed=options.seed,
     )
-    start, rate = time.perf_counter(), 0.0
+    spent, rate = 0.0, 0.0
     while model.num_timesteps < options.steps:
+        start = time.perf_counter()
         model.learn(options.every, reset_num_timesteps=False)
-        spent, rate = time.perf_counter() - start, success(model, test)
+        spent += time.perf_counter() - start
+        rate = success(model, test)
         print(f"{model.num_timesteps:>9,} steps  {spent:6.1f} s  solved {rate:6.1%}", flush=True)
     return rate
 

@@ -19,12 +19,13 @@ from training.results.originals import Originals
 from training.results.result import read_results
 from training.results.video import film_episode
 from training.settings.environments import task_of
+from training.settings.seed_ranges import EVALUATION
 
 Array = np.ndarray
 
 ROOT = Path(__file__).parents[2]
-FILMED = ("FetchPush", "PandaPush", "PandaPickAndPlace")
-SEEDS = (1_000_000, 1_000_001, 1_000_002)  # the first of every evaluation
+FILMED = ("FetchPush", "FetchPickAndPlace", "PandaPush", "PandaStack")
+SEEDS = range(EVALUATION, EVALUATION + 3)  # the first of `evaluate --in`
 HEIGHT, FPS = 240, 25  # pixels of a frame; of the originals' steps of 40 ms
 AFTER = 10  # frames that are shown after the goal is met
 
@@ -54,6 +55,7 @@ def film(policy: Policy, gif: Path, python: Path | None = None) -> None:
             start, there = episode(originals, policy, seed)
             env = RigidEnv(
                 starting_at(twin(), start), render_mode="rgb_array",
+                fidelity=policy.env_kwargs.get("fidelity", "balanced"),
                 terminate_on_success=twin.ends_on_success,
             )  # fmt: skip
             with closing(env):

@@ -1,8 +1,8 @@
 """Scripts that strangers wrote for Fetch and Panda environments, run on twins.
 
 Each is fetched from GitHub into a temporary folder and changed in two ways only: ids of
-environments become those of twins, and `import rigid_envs` stands where the original's package was
-imported. A script that would go on is stopped after 10,000 steps of the environment.
+environments become those of twins, and `rigid_envs` stands where the original's package was
+imported or registered. A script that would go on is stopped after 10,000 steps of the environment.
 """
 
 import os

@@ -22,7 +22,7 @@ class Replay(NamedTuple):
 
     Attributes:
         hand: [steps + 1, episodes, 3] m.
-        body: [steps + 1, episodes, 3] m, of the object; no episodes if there is none.
+        body: [steps + 1, episodes, 3] m, of the object; no steps if there is none.
         opening: [steps + 1, episodes] m, how far each finger is open; 0 of closed hands.
     """
 

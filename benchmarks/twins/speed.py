@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -15,7 +14,7 @@ import numpy as np
 from rigid_envs.twins import TWINS
 from training.policies.policy import Policy
 from training.policies.trained_policy import shipped_policy
-from training.results.originals import INTERPRETER
+from training.results.originals import find_interpreter
 from training.settings.errors import UsageError
 
 WORKER = Path(__file__).with_name("speed_worker.py")
@@ -49,8 +48,7 @@ def steps_per_second(env_id: str, cores: int, policy: Policy | None = None) -> f
 
 def original(env_id: str, cores: int, python: Path | None) -> tuple[str, float]:
     """The fastest peer of an original, and its steps per second."""
-    interpreter = python or (INTERPRETER if INTERPRETER.exists() else Path(sys.executable))
-    command = [str(interpreter), str(WORKER), env_id, str(cores), str(SECONDS)]
+    command = [str(find_interpreter(python)), str(WORKER), env_id, str(cores), str(SECONDS)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     found = json.loads(done.stdout.splitlines()[-1])
     return max(found.items(), key=lambda one: one[1])

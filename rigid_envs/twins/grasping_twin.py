@@ -21,7 +21,7 @@ class GraspingTwin(Twin):
             above the object; for training.
 
     Attributes:
-        hand: the hand, with the methods `position`, `opening` and `pads`.
+        hand: the hand, with the methods `position`, `opening`, `pads` and `place`.
         half: m, half the width of the object.
         closed: part of the starts around the object in which the fingers already touch it.
     """

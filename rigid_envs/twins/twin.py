@@ -66,6 +66,16 @@ class Twin(Task):
         return {}
 
 
+def behind(achieved: Array, desired: Array, gap: float) -> Array:
+    """The points [n, 3] m `gap` m behind objects [n, 3] m as seen from their goals [n, 3] m.
+
+    They are at the height of the objects.
+    """
+    from_goal = (achieved - desired) * np.array([1.0, 1.0, 0.0])
+    length = np.sqrt(np.sum(from_goal**2, axis=1, keepdims=True))
+    return np.asarray(achieved + gap / np.maximum(length, 1e-6) * from_goal)
+
+
 def components(limit: float, *names: str) -> Bounds:
     """Bounds of components that lie within ±limit, in the unit that the original has."""
     return tuple((name, "", -limit, limit) for name in names)

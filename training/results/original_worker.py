@@ -27,7 +27,7 @@ MODULES = {"Fetch": "gymnasium_robotics", "Panda": "panda_gym"}
 
 def make(request: dict[str, Any]) -> list[Any]:
     """The environments of a request."""
-    if sys.platform == "linux" and "DISPLAY" not in os.environ:
+    if request["render_mode"] and sys.platform == "linux" and "DISPLAY" not in os.environ:
         os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo draws without a display
     import gymnasium as gym
 

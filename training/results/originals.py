@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
@@ -38,7 +39,7 @@ INSTALL = {
 }
 """What an interpreter needs, by the first word of the ids."""
 PROCESSES, WORLDS = 2, 20
-"""Of an evaluation."""
+"""Of an evaluation, and of each process."""
 GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
 
 
@@ -151,21 +152,27 @@ class Originals:
         self.python = find_interpreter(python)
         self.env_id, self.worlds = env_id, worlds
         self._shares = [len(part) for part in np.array_split(np.arange(worlds), processes)]
-        self._workers = [
-            subprocess.Popen(
-                [str(self.python), str(WORKER)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, text=True,
-            )
-            for _ in self._shares
-        ]  # fmt: skip
+        self._workers: list[subprocess.Popen[str]] = []
         mode = "rgb_array" if render else None
         try:
+            for _ in self._shares:
+                self._workers.append(self._start())
             self.description = self._ask(
                 [{"make": env_id, "worlds": n, "render_mode": mode} for n in self._shares]
             )[0]
         except BaseException:
             self.close()
             raise
+
+    def _start(self) -> "subprocess.Popen[str]":
+        """A new worker."""
+        try:
+            return subprocess.Popen(
+                [str(self.python.absolute()), str(WORKER)], stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            )  # fmt: skip
+        except OSError as error:
+            raise UsageError(f"{self.python} can't run: {error.strerror}") from None
 
     def reset(self, seeds: Sequence[int]) -> dict[str, Array]:
         """Starts an episode in each world, with its seed; returns observations (worlds, ...)."""
@@ -188,7 +195,8 @@ class Originals:
             worker.wait()
             for stream in (worker.stdin, worker.stdout):
                 if stream is not None:
-                    stream.close()
+                    with suppress(BrokenPipeError):  # of what an ended worker didn't read
+                        stream.close()
 
     def __enter__(self) -> Self:
         return self
@@ -225,7 +233,12 @@ class Originals:
             lines = [""]
         if not all(lines):
             raise UsageError(f"{self.python} ended while it ran {self.env_id}")
-        replies: list[dict[str, Any]] = [json.loads(line) for line in lines]
+        try:
+            replies: list[dict[str, Any]] = [json.loads(line) for line in lines]
+        except json.JSONDecodeError:
+            raise UsageError(
+                f"{self.python} is no Python interpreter: it said {lines[0]!r}"
+            ) from None
         for reply in replies:
             if "error" in reply:
                 raise UsageError(self._explain(reply["error"]))

@@ -57,7 +57,7 @@ def twins_table(results: Sequence[Result]) -> str:
     ]
     for group in by_kind(results):
         cells = [
-            f"{group[0].env_id.removeprefix('RigidEnvs/').removesuffix('-v0')}",
+            group[0].env_id.removeprefix("RigidEnvs/").removesuffix("-v0"),
             group[0].algorithm.upper(),
             str(len(group)),
             f"{statistics.fmean(one.steps for one in group) / 1e6:.2g} M",

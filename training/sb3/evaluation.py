@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from training.policies.episodes import play_episodes
 from training.settings.seed_ranges import TRAINING_EVALUATION
+
+RATE = "eval/success_rate"
 
 
 class SuccessEvaluation(BaseCallback):
@@ -46,12 +49,14 @@ class SuccessEvaluation(BaseCallback):
         episodes = play_episodes(self._envs, self._act, seed)
         self.at_step = self.num_timesteps
         self.rate = float(episodes.success_at_end.mean())
-        self.logger.record("eval/success_rate", self.rate)
+        self.logger.record(RATE, self.rate)
 
     def _on_step(self) -> bool:
         return True
 
     def _on_training_end(self) -> None:
+        if isinstance(self.model, OffPolicyAlgorithm) and RATE in self.logger.name_to_value:
+            self.model.dump_logs()  # it ends before it writes the last evaluation
         if self._envs is not None:
             self._envs.close()
             self._envs = None

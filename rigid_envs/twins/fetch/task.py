@@ -14,7 +14,7 @@ from rigid_envs.twins.fetch.hand import (
     ClosedHand,
     OpenHand,
 )
-from rigid_envs.twins.twin import Twin, along_axes, components
+from rigid_envs.twins.twin import Twin, along_axes, behind, components
 
 Array = np.ndarray
 
@@ -25,6 +25,7 @@ FINGERS = ("right finger", "left finger")
 # FetchSlide, so all fail once in 16,000 episodes
 STARTS = 40
 CLEARANCE = 0.1  # m, of the object's start from the hand along the table
+BEHIND = 0.05  # m, from the object to where the hand is led
 
 
 class FetchTask(Twin):
@@ -128,9 +129,7 @@ class FetchObject(FetchTask):
 
         Behind means 5 cm away on the far side as seen from the goal.
         """
-        from_goal = achieved - desired
-        behind = achieved + from_goal * (0.05 / np.maximum(goal_distance, 1e-6))[:, None]
-        return {"reach": -distance(self.hand.position(now), behind)}
+        return {"reach": -distance(self.hand.position(now), behind(achieved, desired, BEHIND))}
 
 
 def rotation(orientation: Array) -> Array:

@@ -7,7 +7,8 @@ import numpy as np
 from physics import Body, Box, Cylinder, Drag, Material, Readout, Scene, World
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand
-from rigid_envs.twins.panda.task import FRICTION, PandaObject, behind, observed
+from rigid_envs.twins.panda.task import BEHIND, FRICTION, PandaObject, observed
+from rigid_envs.twins.twin import behind
 
 Array = np.ndarray
 
@@ -66,6 +67,6 @@ class PandaSlide(PandaObject):
             np.sum(to_goal * ahead, axis=1), 0.0, speed**2 / (2.0 * PUCK_FRICTION * GRAVITY)
         )
         miss = np.sqrt(np.sum((to_goal - ahead * way[:, None]) ** 2, axis=1))
-        reach = distance(self.hand.position(now), behind(achieved, desired))
+        reach = distance(self.hand.position(now), behind(achieved, desired, BEHIND))
         gone = achieved[:, 0] > REACH
         return {"aim": -miss, "reach": np.where(gone, 0.0, -reach)}

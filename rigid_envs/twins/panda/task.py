@@ -10,13 +10,14 @@ from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
 from rigid_envs.twins.panda.arm import ARM
 from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand, OpenHand, Solids
-from rigid_envs.twins.twin import Twin, along_axes, components
+from rigid_envs.twins.twin import Twin, along_axes, behind, components
 
 Array = np.ndarray
 
 LIMIT = 10.0  # of every component, as the original's spaces say; its values can be larger
 RANGE = 0.15  # m, largest offset of starts and goals from their middle along x and y
 HALF = 0.02  # m, half the width of a cube
+BEHIND = 0.045  # m, from the object to where the hand is led
 FRICTION = 0.25  # Coulomb's coefficient of cubes and table
 
 
@@ -100,7 +101,7 @@ class PandaObject(PandaTask):
         self, world: World, now: Readout, achieved: Array, desired: Array, goal_distance: Array
     ) -> dict[str, Array]:
         """`reach`: minus the distance in m from the hand to the point behind the object."""
-        return {"reach": -distance(self.hand.position(now), behind(achieved, desired))}
+        return {"reach": -distance(self.hand.position(now), behind(achieved, desired, BEHIND))}
 
 
 def cube(name: str, mass: float, height: float) -> Body:
@@ -117,13 +118,6 @@ def observed(hand: ClosedHand | OpenHand, *bodies: str) -> Bounds:
     parts = ("", " rotation", " velocity", " angular velocity")
     names = along_axes(*(f"{body}{part}" for body in bodies for part in parts))
     return components(LIMIT, *along_axes("hand", "hand velocity"), *hand.names, *names)
-
-
-def behind(achieved: Array, desired: Array) -> Array:
-    """The point [n, 3] m 4.5 cm behind objects [n, 3] m, as seen from their goals [n, 3] m."""
-    from_goal = achieved - desired
-    length = np.maximum(np.sqrt(np.sum(from_goal**2, axis=1, keepdims=True)), 1e-6)
-    return np.asarray(achieved + 0.045 / length * from_goal)
 
 
 def rotation(orientation: Array) -> Array:

@@ -3,6 +3,7 @@
 import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,6 +74,14 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(tmp_path, mo
         Originals("PandaReach-v3", 1)
     with pytest.raises(UsageError, match="which is no file; `make twins` makes one"):
         Originals("PandaReach-v3", 1, python=tmp_path / "python")
+    text = tmp_path / "text"
+    text.write_text("no program")
+    with pytest.raises(UsageError, match=r"text can't run: Permission denied"):
+        Originals("PandaReach-v3", 2, python=text, processes=2)
+    with pytest.raises(
+        UsageError, match=r"echo is no Python interpreter: it said|echo ended while it ran"
+    ):
+        Originals("PandaReach-v3", 1, python=Path("/bin/echo"))
     worker = tmp_path / "worker.py"
     failing = {"error": "AssertionError: "}
     worker.write_text(f"print({json.dumps(json.dumps(failing))}, flush=True)\ninput()")

@@ -74,6 +74,18 @@ def test_training_ends_when_an_evaluation_reaches_the_target_and_keeps_that_poli
     assert played.success_at_end.mean() == reached[-1]
 
 
+def test_the_evaluation_at_which_sac_ends_is_in_its_curve(quick_sac, tmp_path, monkeypatch):
+    def play(envs, act, seed):
+        return play_episodes(envs, act, seed)._replace(success_at_end=np.ones(5, dtype=bool))
+
+    monkeypatch.setattr(evaluation, "play_episodes", play)
+    config = quick_sac.replace(target_success_rate=0.9, eval_freq=120, n_eval_episodes=5)
+    result = train(config, tmp_path, quiet=True)
+    assert result.steps < config.n_timesteps
+    evaluated = [row[EVALUATED] for row in read_learning_curve(result.folder) if EVALUATED in row]
+    assert evaluated == [1.0]
+
+
 def test_a_resumed_run_evaluates_other_episodes_than_before(quick_ppo, tmp_path, monkeypatch):
     seeds = []
 
