@@ -38,11 +38,11 @@ def main() -> None:
         print(f"and then its fingers: holding {holding:.1f}, creeping {creeping:.3f}")
         slides = recordings.Recording.load("fetch-slides")
         free = identify.Slides.of(slides)
-        sliding, creeping, gliding = free.braking()
-        print(f"FetchSlide's puck: sliding {sliding:.2f} m/s^2, creeping {creeping:.2f} 1/s, "
-              f"gliding {gliding:.3f} m/s")  # fmt: skip
+        deceleration, damping, gliding = free.braking()
+        print(f"FetchSlide's puck: deceleration {deceleration:.2f} m/s^2, damping "
+              f"{damping:.2f} 1/s, gliding {gliding:.3f} m/s")  # fmt: skip
         print(f"its restitution: {identify.restitution(slides):.2f}")
-        low, high = free.glides(sliding, creeping)
+        low, high = free.glides(deceleration, damping)
         print(f"nine of ten glide at {low:.3f} to {high:.3f} m/s")
     elif options.command == "scripts":
         for line in public_scripts.table():

@@ -60,8 +60,7 @@ def grips(recording: Recording) -> tuple[float, float]:
         asked = fetch.STRIDE * actions[:, :3]
         free = task.hand.arm.respond(world, hand[step], velocity[step], asked, FRAME).moved[:, -1]
         world.advance(FRAME)
-        lacking = np.maximum(fetch.RESTING - hand[step, :, 2] - free[:, 2], 0.0)
-        below.append(lacking)
+        below.append(fetch.lifted(hand[step, :, 2], free[:, 2])[1])
         ahead.append(np.clip(fingers[step] + actions[:, 3], 0.0, fetch.FARTHEST) - fingers[step])
         before.append(speeds[step])
         moved.append(fingers[step + 1] - fingers[step])
@@ -97,8 +96,7 @@ def pressing(recording: Recording) -> tuple[float, float, float, float]:
         return np.asarray(fetch.braked(before[:, 2], free, *parameters)[:, 1] - kept)
 
     sliding, creeping = least_squares(lack, (1.0, 0.5)).x
-    height = np.maximum(before[:, 2], fetch.RESTING)
-    below = np.maximum(fetch.RESTING - height - free[:, 2], 0.0)
+    below = fetch.lifted(before[:, 2], free[:, 2])[1]
 
     def deeper(parameters: Array) -> Array:
         return np.asarray(1e3 * (fetch.sunk(below, *parameters) - fetch.RESTING + after[:, 2]))
@@ -163,32 +161,32 @@ class Slides(NamedTuple):
         return cls(puck[start, episodes, :2][used], v[used], (last - start)[used],
                    puck[-1, used, :2])  # fmt: skip
 
-    def miss(self, sliding: float, creeping: float, gliding: Any) -> Array:
+    def miss(self, deceleration: float, damping: float, gliding: Any) -> Array:
         """How far [n, 2] m beyond its end a law has each puck; as the twin, a frame at a time."""
         position, velocity = self.position, self.velocity
         for step in range(self.steps.max()):
-            after = velocity + FRAME * slide.braking(velocity, sliding, creeping, gliding)
+            after = velocity + FRAME * slide.braking(velocity, deceleration, damping, gliding)
             moving = (step < self.steps)[:, None]
             position = position + np.where(moving, 0.5 * FRAME * (velocity + after), 0.0)
             velocity = after
         return position - self.end
 
     def braking(self) -> tuple[float, float, float]:
-        """`SLIDING`, `CREEPING` and a `GLIDING` with which all are nearest to their end."""
+        """`DECELERATION`, `DAMPING` and a `GLIDING` with which all are nearest to their end."""
 
         def lack(parameters: Array) -> float:
-            sliding, creeping, gliding = parameters
-            miss = self.miss(sliding, creeping, max(gliding, 0.0))
+            deceleration, damping, gliding = parameters
+            miss = self.miss(deceleration, damping, max(gliding, 0.0))
             return float(np.linalg.norm(miss, axis=1).mean())
 
         found = minimize(lack, (1.0, 7.0, 0.03), method="Nelder-Mead").x
         return float(found[0]), float(found[1]), float(found[2])
 
-    def glides(self, sliding: float, creeping: float) -> tuple[float, float]:
+    def glides(self, deceleration: float, damping: float) -> tuple[float, float]:
         """5 and 95 % quantiles of the speeds in m/s of gliding, one for each puck."""
         direction = self.velocity / np.linalg.norm(self.velocity, axis=1, keepdims=True)
         tried = np.linspace(0.0, 0.12, 49)
-        along = [np.sum(self.miss(sliding, creeping, g) * direction, axis=1) for g in tried]
+        along = [np.sum(self.miss(deceleration, damping, g) * direction, axis=1) for g in tried]
         each = [np.interp(0.0, row, tried) for row in np.array(along).T]
         low, high = np.quantile(each, (0.05, 0.95))
         return float(low), float(high)

@@ -37,6 +37,7 @@ def replay(recording: Recording, twin: Twin, fidelity: str = "balanced") -> Repl
     world = World(twin.scene(), fidelity, count)
     first = OBJECT[type(twin).__name__[:5].lower()]
     bodies = len(world.scene.bodies)
+    twin.start(world, np.ones(count, dtype=bool), np.full((count, twin.draw_count), 0.5))
     if bodies:
         world.set_state(position=recording.observations[0, :, None, first : first + 3])
     hands, body, opening = [], [], []

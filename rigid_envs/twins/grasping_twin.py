@@ -38,13 +38,26 @@ class GraspingTwin(Twin):
         )
 
     def start_near_grasps(
-        self, world: World, mask: Array, draws: Array, body: Array | int = 0
+        self,
+        world: World,
+        mask: Array,
+        draws: Array,
+        body: Array | int = 0,
+        possible: Array | bool = True,
     ) -> None:
-        """Moves the hand around a body in some worlds, see the function of this name."""
+        """Moves the hand around a body in some worlds, see the function of this name.
+
+        Args:
+            world: the worlds.
+            mask: [count] bool, those that have been reset; n of them.
+            draws: [n, NEAR_GRASP_DRAWS] uniform in [0, 1).
+            body: [n] its index.
+            possible: [n] whether there is room for the fingers.
+        """
+        probability = np.where(possible, self.near_grasp_start_prob, 0.0)
         chosen, position = start_near_grasps(
-            world, mask, draws, self.near_grasp_start_prob, self.hand.pads, self.half, body,
-            self.closed,
-        )  # fmt: skip
+            world, mask, draws, probability, self.hand.pads, self.half, body, self.closed
+        )
         if len(position):
             self.hand.place(world, chosen, position)
 

@@ -85,7 +85,9 @@ class PickAndPlace(Task):
         position[:, 0, :2], position[:, 0, 2] = RANGE * (2.0 * places - 1.0), half
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
-        start_near_grasps(world, mask, near, self.near_grasp_start_prob, self.pads, HALF)
+        start_near_grasps(
+            world, mask, near, self.near_grasp_start_prob, self.pads, half, lowest=self.hand.low[2]
+        )
 
         drawn = goal_draws.reshape(n, GOAL_DRAWS, 4)
         goals = np.zeros((n, GOAL_DRAWS + 1, 3))

@@ -68,10 +68,21 @@ class Arm:
     @cached_property
     def start_pose(self) -> tuple[Array, Array]:
         """Position [3] m and rotation [3, 3] of the hand at the start of an episode."""
+        work = self._locate_start()
+        return self.base + work.origin[JOINTS, :, 0], work.rotation[JOINTS, :, :, 0]
+
+    @cached_property
+    def start_velocity(self) -> Array:
+        """[3] m/s, of the hand at the start of an episode."""
+        work = self._locate_start()
+        differentiate(work)
+        return np.asarray(work.jacobian[:3, :, 0] @ self.start[JOINTS:] + self.rise)
+
+    def _locate_start(self) -> Any:
         work = make_work()
         work.angles[...] = self.start[:JOINTS, None]
         locate(self.chain, work.angles, work)
-        return self.base + work.origin[JOINTS, :, 0], work.rotation[JOINTS, :, :, 0]
+        return work
 
     def respond(
         self,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from physics.compiler.jit import entry
+from physics.rotation import rotation_matrix
 from rigid_envs.twins.arms.arm import Arm, hold_back, predict, read, write, write_part
 from rigid_envs.twins.arms.chain import Link, differentiate, locate, make_chain
 from rigid_envs.twins.arms.dynamics import weigh
@@ -26,17 +27,6 @@ from rigid_envs.twins.fetch.weld import (
 )
 
 Array = np.ndarray
-
-
-def _rotation(w: float, x: float, y: float, z: float) -> Array:
-    """Rotation [3, 3] of a unit quaternion."""
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
 
 
 def _links() -> list[Link]:
@@ -59,8 +49,8 @@ def _links() -> list[Link]:
          (1, 0, 0, 0), (0.0001, 0.0001, 0.0001)),
     )  # fmt: skip
     links = []
-    for offset, axis, mass, center, frame, inertia in rows:
-        R = _rotation(*frame)
+    for offset, axis, mass, center, (w, *xyz), inertia in rows:
+        R = rotation_matrix(np.array([*xyz, w]))
         links.append(Link(offset, np.eye(3), axis, mass, center, R @ np.diag(inertia) @ R.T))
     # fixed to the last link: the hand, and two fingers that move little
     links[-1] = links[-1].carrying(
@@ -116,22 +106,22 @@ def make_arm(base: float, angles: tuple[float, ...], speeds: tuple[float, ...]) 
 
 
 # as the originals' resets leave them: of FetchReach, FetchPickAndPlace, FetchPush and FetchSlide
-REACHING = make_arm(
+REACH_ARM = make_arm(
     0.4049,
     (0.009952, -0.825639, -0.003625, 1.443894, 0.003059, 0.953220, 0.005520),
     (0.000744, 0.006461, -0.001390, -0.002184, 0.001103, -0.001168, -0.000928),
 )
-HIGH = make_arm(
+PICK_ARM = make_arm(
     0.405,
     (0.009951, -0.825639, -0.003624, 1.443894, 0.003061, 0.953220, 0.005518),
     (0.000746, 0.006461, -0.001392, -0.002184, 0.001103, -0.001168, -0.000928),
 )
-LOW = make_arm(
+PUSH_ARM = make_arm(
     0.405,
     (0.012383, -0.589417, -0.005435, 1.453137, 0.002139, 0.699147, 0.007581),
     (0.005322, 0.002748, -0.003969, 0.007792, 0.000282, 0.021637, 0.003075),
 )
-FAR = make_arm(
+SLIDE_ARM = make_arm(
     0.05,
     (0.013982, -0.586468, -0.006729, 1.450737, 0.001034, 0.693262, 0.009155),
     (0.009600, 0.000782, -0.006937, 0.011945, -0.002065, 0.035686, 0.007463),

@@ -23,8 +23,6 @@ STRIDE = 0.05  # m, displacement along each axis that an action asks for
 
 # identified
 SERVO = Servo(55.8, 1.09)
-RESTING = 0.4195  # m, height of a hand that rests on the table
-CLEAR = 2e-3  # m, chosen: a hand that is so far above it doesn't press
 # of a hand that presses on the table: loss of displacement along the table per lack of displacement
 # downwards where it slides, and the part that is lost where it creeps
 SLIDING, CREEPING = 0.96, 0.54
@@ -32,18 +30,23 @@ SLIDING, CREEPING = 0.96, 0.54
 SINKING, FIRM = 0.16, 5.7e-3
 # friction holds fingers of a hand that presses: up to so many m from their set point per m of
 # displacement that it lacks downwards. Held ones creep by this part of the distance in a step
-HOLDING, FINGER_CREEPING = 2.8, 0.012
+HOLDING, FINGER_CREEPING = 3.7, 0.012
 
 # from the originals' model. Boxes of fingers are 1 mm larger: their contacts begin at that distance
 MARGIN = 1e-3  # m
+TABLE = 0.4  # m, height of its top
 ABOVE_GRIP = 0.02  # m, of the fingers' middle over the grip site, whose position is observed
 HALF_LENGTH, HALF_DEPTH, HALF_WIDTH = 0.0385, 0.0135, 0.007  # m, of a finger along z, x and y
+RESTING = TABLE + HALF_LENGTH + MARGIN - ABOVE_GRIP  # m, height of a hand that rests on the table
+CLEAR = 2e-3  # m, chosen: a hand that is so far above it doesn't press
 CLOSED = 0.0079  # m along y, of a closed finger's middle from the hand's
 WIDEST = 0.05  # m, how far a finger opens
 FRICTION = 1.0
 # a finger is a mass of 104 kg, with its motor's inertia, on a spring of 30 kN/m with a damper
 FINGER = Servo((30e3 / 104.0) ** 0.5, 1e3 / (2.0 * (30e3 * 104.0) ** 0.5))
 FARTHEST = 0.2  # m, of a finger's set point
+# chosen for the first steps of FetchSlide: how soon rising hands leave the table, see `lifted`
+LEAVING = 0.5
 
 # groups: the object and the table, and the hand; the arm knows the table under a hand
 OBJECT, HAND = 1, 2
@@ -203,7 +206,7 @@ def _follow(
 def lifted(height: Array, rising: Array) -> tuple[Array, Array]:
     """How far the table pushes out hands that begin in it, and what it denies to those that sink.
 
-    A hand that rises leaves the table sooner. How much sooner fits the first steps of FetchSlide.
+    One that rises as far as it is deep in the table is pushed out by exp(-LEAVING) of that depth.
 
     Args:
         height: [n] m, of the hands.
@@ -213,7 +216,7 @@ def lifted(height: Array, rising: Array) -> tuple[Array, Array]:
         [n] m and [n] m.
     """
     deep = np.maximum(RESTING - height, 0.0)
-    out = deep * np.exp(-0.5 * np.maximum(rising, 0.0) / np.maximum(deep, 1e-9))
+    out = deep * np.exp(-LEAVING * np.maximum(rising, 0.0) / np.maximum(deep, 1e-9))
     return out, np.maximum(RESTING - np.maximum(height, RESTING) - rising, 0.0)
 
 

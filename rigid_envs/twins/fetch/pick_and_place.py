@@ -6,7 +6,7 @@ import numpy as np
 
 from physics import Body, Readout, World
 from rigid_envs.tasks.grasping.grasps import NEAR_GRASP_DRAWS
-from rigid_envs.twins.fetch.arm import HIGH
+from rigid_envs.twins.fetch.arm import PICK_ARM
 from rigid_envs.twins.fetch.hand import CLEAR, RESTING, OpenHand
 from rigid_envs.twins.fetch.push import HALF, cube
 from rigid_envs.twins.fetch.task import FetchObject
@@ -22,7 +22,7 @@ class FetchPickAndPlace(FetchObject, GraspingTwin):
     """Half of the goals lie up to 45 cm above the table; solved within 5 cm of the goal."""
 
     original = "FetchPickAndPlace-v4"
-    hand: ClassVar[OpenHand] = OpenHand(HIGH)
+    hand: ClassVar[OpenHand] = OpenHand(PICK_ARM)
     half = HALF
     closed = 0.5
     draw_count = FetchObject.draw_count + NEAR_GRASP_DRAWS

@@ -1,9 +1,9 @@
 """FetchPush: the closed fingers push a cube over the table."""
 
 from physics import Body, Box, Material
-from rigid_envs.twins.fetch.arm import LOW
-from rigid_envs.twins.fetch.hand import HAND, OBJECT, ClosedHand
-from rigid_envs.twins.fetch.task import TABLE, FetchObject
+from rigid_envs.twins.fetch.arm import PUSH_ARM
+from rigid_envs.twins.fetch.hand import HAND, OBJECT, TABLE, ClosedHand
+from rigid_envs.twins.fetch.task import FetchObject
 
 HALF = 0.025  # m, half the width of the cube
 
@@ -21,7 +21,7 @@ class FetchPush(FetchObject):
     """Cube and goal lie within 15 cm of the hand along x and y; solved within 5 cm of the goal."""
 
     original = "FetchPush-v4"
-    hand = ClosedHand(LOW)
+    hand = ClosedHand(PUSH_ARM)
 
     def object(self) -> Body:
         """The cube."""

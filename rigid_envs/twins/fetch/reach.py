@@ -3,9 +3,9 @@
 import numpy as np
 
 from physics import Ground, Material, Readout, Scene, World
-from rigid_envs.twins.fetch.arm import REACHING
-from rigid_envs.twins.fetch.hand import OBJECT, ClosedHand
-from rigid_envs.twins.fetch.task import FINGERS, TABLE, FetchTask
+from rigid_envs.twins.fetch.arm import REACH_ARM
+from rigid_envs.twins.fetch.hand import OBJECT, TABLE, ClosedHand
+from rigid_envs.twins.fetch.task import FINGERS, FetchTask
 from rigid_envs.twins.twin import along_axes, components
 
 Array = np.ndarray
@@ -17,7 +17,7 @@ class FetchReach(FetchTask):
     """Goals lie within 15 cm of the hand's start along each axis; solved within 5 cm."""
 
     original = "FetchReach-v4"
-    hand = ClosedHand(REACHING)
+    hand = ClosedHand(REACH_ARM)
     bounds = components(
         np.inf,
         *along_axes("hand"), *FINGERS,
@@ -34,6 +34,7 @@ class FetchReach(FetchTask):
     def start(self, world: World, mask: Array, draws: Array) -> Array:
         """The hand at its start."""
         world.reset(mask)
+        world.set_state(drive_velocity=self.hand.arm.start_velocity, worlds=mask)
         return np.array(self.hand.start) + RANGE * (2.0 * draws - 1.0)
 
     def observe(self, world: World, now: Readout, out: Array) -> None:

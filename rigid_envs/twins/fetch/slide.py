@@ -11,7 +11,7 @@ import numpy as np
 
 from physics import Body, Cylinder, Material, Readout, World
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.twins.fetch.arm import FAR
+from rigid_envs.twins.fetch.arm import SLIDE_ARM
 from rigid_envs.twins.fetch.hand import CLEAR, HAND, OBJECT, RESTING, ClosedHand
 from rigid_envs.twins.fetch.pyramid import friction
 from rigid_envs.twins.fetch.task import FetchObject
@@ -22,14 +22,14 @@ RADIUS, HALF_HEIGHT, MASS = 0.025, 0.02, 2.0  # m, m and kg, of the puck
 REACH = 0.4  # m along x from the hand's start; beyond it the hand can't follow the puck
 
 # identified by `python -m benchmarks.twins identify`
-SLIDING = 1.0  # m/s^2, largest sum of the decelerations along x and y
-CREEPING = 6.35  # 1/s, deceleration of a slow puck per speed above that at which it glides
-GLIDING = 0.033  # m/s, on average
+DECELERATION = 1.0  # m/s^2, largest sum of the decelerations along x and y
+DAMPING = 6.35  # 1/s, deceleration of a slow puck per speed above that at which it glides
+GLIDING = 0.033  # m/s, on average: the middle of those that fit nine of ten slides
 GLIDES = 0.028  # m/s, largest difference from that average in an episode
 
 RESTITUTION = 0.37  # of the puck; chosen, see docs/twins.md
 # m, chosen, over a hand that rests on the table: of one that is led to the puck, and at most
-ABOVE, HIGH = 6e-3, 0.015
+ABOVE, TOO_HIGH = 6e-3, 0.015
 _STEPS = 25  # in which the motion of a puck to the end of its episode is computed
 
 
@@ -37,7 +37,7 @@ class FetchSlide(FetchObject):
     """The middle of the goals lies 40 cm ahead of the hand; solved within 5 cm of the goal."""
 
     original = "FetchSlide-v4"
-    hand = ClosedHand(FAR)
+    hand = ClosedHand(SLIDE_ARM)
     start_range = 0.1
     goal_range = 0.3
     goal_offset = 0.4
@@ -67,7 +67,9 @@ class FetchSlide(FetchObject):
         super().act(world, now, actions)
         force = np.zeros((world.count, 3))
         gliding = GLIDING + world.memory("glide", 1)
-        force[:, :2] = MASS * braking(now.linear_velocity[:, 0, :2], gliding=gliding)
+        force[:, :2] = world.parameters.mass * braking(
+            now.linear_velocity[:, 0, :2], gliding=gliding
+        )
         world.apply_wrench(force, body="puck")
 
     def guidance(
@@ -90,7 +92,7 @@ class FetchSlide(FetchObject):
         above = achieved + np.array([0.0, 0.0, RESTING + ABOVE - self.start_height])
         reach = super().guidance(world, now, above, desired, goal_distance)["reach"]
         height = self.hand.position(now)[:, 2] - RESTING
-        wrong = (height < CLEAR) | (height > HIGH)
+        wrong = (height < CLEAR) | (height > TOO_HIGH)
         gone = achieved[:, 0] > self.hand.start[0] + REACH
         miss = distance(end, desired)
         hit = np.exp(-((miss / self.threshold) ** 2))
@@ -100,23 +102,23 @@ class FetchSlide(FetchObject):
 
 def braking(
     velocity: Array,
-    sliding: float = SLIDING,
-    creeping: float = CREEPING,
+    deceleration: float = DECELERATION,
+    damping: float = DAMPING,
     gliding: Array | float = GLIDING,
 ) -> Array:
     """Acceleration [n, 2] m/s^2 of a puck that slides with a velocity [n, 2] m/s.
 
-    A slow puck creeps, braked by creeping (v - gliding v / |v|).
+    A slow puck creeps, braked by damping (v - gliding v / |v|).
 
     Args:
         velocity: [n, 2] m/s.
-        sliding: see `SLIDING`.
-        creeping: see `CREEPING`.
+        deceleration: see `DECELERATION`.
+        damping: see `DAMPING`.
         gliding: m/s, at which it glides on; one number, or [n, 1].
     """
     speed = np.sqrt(np.sum(velocity.astype(float) ** 2, axis=1, keepdims=True))
     slip = velocity * (1.0 - gliding / np.maximum(speed, gliding))
-    return friction(slip, sliding, creeping)
+    return friction(slip, deceleration, damping)
 
 
 def predicted(

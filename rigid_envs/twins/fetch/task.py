@@ -6,19 +6,14 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Body, Ground, Material, Readout, Scene, World
+from physics.orientation import to_euler
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
-from rigid_envs.twins.fetch.hand import (
-    ACTIONS,
-    OBJECT,
-    ClosedHand,
-    OpenHand,
-)
+from rigid_envs.twins.fetch.hand import ACTIONS, OBJECT, TABLE, ClosedHand, OpenHand
 from rigid_envs.twins.twin import Twin, along_axes, behind, components
 
 Array = np.ndarray
 
-TABLE = 0.4  # m, height of its top
 CAMERA = Camera.around((1.3, 0.75, 0.44), 1.16, azimuth=-75.0, elevation=42.0)
 FINGERS = ("right finger", "left finger")
 # drawn per episode; the first one that is far enough from the hand is used. One in five is in
@@ -97,7 +92,8 @@ class FetchObject(FetchTask):
         position = np.full((n, 1, 3), self.start_height)
         position[:, 0, :2] = home + offsets[np.arange(n), np.argmax(far, axis=1)]
         world.reset(mask)
-        world.set_state(position=position, worlds=mask)
+        velocity = self.hand.arm.start_velocity
+        world.set_state(position=position, drive_velocity=velocity, worlds=mask)
         goals = np.full((n, 3), self.goal_height)
         goals[:, :2] = home + self.goal_range * (2.0 * draws[:, 2 * STARTS : -2] - 1.0)
         goals[:, 0] += self.goal_offset
@@ -137,10 +133,6 @@ def rotation(orientation: Array) -> Array:
 
     The rotation is the product of rotations about x, y and z in this order (in the moving frame).
     """
-    x, y, z, w = np.asarray(orientation, dtype=float).T
-    xx, yx = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z)  # of the first row of the matrix
-    zx = 2.0 * (x * z + w * y)
-    zy, zz = 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)  # of its last column
-    return np.stack(
-        [-np.arctan2(zy, zz), np.arctan2(zx, np.hypot(zy, zz)), -np.arctan2(yx, xx)], axis=1
-    )
+    # the opposite rotation is that by the opposite angles about z, y and x
+    opposite = orientation * np.array([-1.0, -1.0, -1.0, 1.0])
+    return -to_euler(opposite)[:, ::-1]

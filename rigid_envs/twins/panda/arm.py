@@ -27,7 +27,7 @@ BASE = np.array([-0.6, 0.0, 0.0])  # m
 NEUTRAL = np.array([0.0, 0.41, 0.0, -1.85, 0.0, 2.26, 0.79])  # rad
 
 _HALF = math.sqrt(0.5)
-HAND = np.array(
+HAND_FRAME = np.array(
     [[_HALF, _HALF, 0.0], [-_HALF, _HALF, 0.0], [0.0, 0.0, 1.0]]
 )  # the hand's frame in that of the last link
 
@@ -61,11 +61,11 @@ def _links() -> list[Link]:
         for offset, quarters, mass, center, inertia in rows
     ]
     for mass, center, inertia in carried:
-        links[-1] = links[-1].carrying(mass, center, HAND @ np.diag(inertia) @ HAND.T)
+        links[-1] = links[-1].carrying(mass, center, HAND_FRAME @ np.diag(inertia) @ HAND_FRAME.T)
     return links
 
 
-CHAIN = make_chain(_links(), (0.0, 0.0, 0.212), HAND)
+CHAIN = make_chain(_links(), (0.0, 0.0, 0.212), HAND_FRAME)
 
 
 @cache

@@ -17,9 +17,10 @@ SUBSTEPS, SUBSTEP = 20, 0.002  # in a step; s
 PIECES = 4  # of a step, for each of which the mass matrix is computed
 TORQUE = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 120.0, 120.0])  # N m, largest of the motors
 GAIN = 0.1  # part of an angle's error that a motor takes away in a substep
-# the fingers' tip on the table: how far it is below the hand's point, m; stiffness of both fingers
-# in N/m, their damping in N s/m, and friction. Bullet makes of the first two which part of a depth
-# is pushed out in a substep, and how much velocity in m/s an impulse in N s leaves
+# the fingers' tip on the table: how far it is below the hand's point, m (7.3 mm of the mesh,
+# 1 mm of PyBullet's margin); stiffness of both fingers in N/m, their damping in N s/m, and
+# friction. Bullet makes of stiffness and damping which part of a depth is pushed out in a
+# substep, and how much velocity in m/s an impulse in N s leaves
 TIP, STIFFNESS, DAMPER, TABLE_FRICTION = 0.0083, 60e3, 2e3, 0.5
 PUSHED_OUT = SUBSTEP * STIFFNESS / (SUBSTEP * STIFFNESS + DAMPER)
 SOFTNESS = 1.0 / (SUBSTEP * (SUBSTEP * STIFFNESS + DAMPER))

@@ -7,7 +7,7 @@ import numpy as np
 from physics import Body, Box, Cylinder, Drag, Material, Readout, Scene, World
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.twins.panda.hand import HAND, OBJECT, ClosedHand
-from rigid_envs.twins.panda.task import BEHIND, FRICTION, PandaObject, observed
+from rigid_envs.twins.panda.task import BEHIND, CUBE_FRICTION, PandaObject, observed
 from rigid_envs.twins.twin import behind
 
 Array = np.ndarray
@@ -39,7 +39,7 @@ class PandaSlide(PandaObject):
 
     def bodies(self) -> list[Body]:
         """A puck of 1 kg."""
-        material = Material(PUCK_FRICTION**2 / FRICTION, restitution=0.0)  # a pair's: the root
+        material = Material(PUCK_FRICTION**2 / CUBE_FRICTION, restitution=0.0)  # a pair's: the root
         return [
             Body(
                 Cylinder(RADIUS, HALF_HEIGHT), mass=MASS, position=(0.0, 0.0, HALF_HEIGHT),

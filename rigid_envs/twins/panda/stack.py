@@ -21,6 +21,8 @@ Array = np.ndarray
 CUBES = ("first cube", "second cube")
 PLACED = 0.04  # m, of the first cube from its goal, for the second one's turn
 JITTER = 0.03  # m, largest offset along x and y of a first cube that starts at its goal
+# m, between the middles of cubes along x or y, so that open fingers around one don't meet the other
+ROOM = (0.05, 0.09)
 HEIGHTS = (HALF, 3.0 * HALF)  # m, of the cubes at their starts and goals
 
 
@@ -88,11 +90,12 @@ class PandaStack(PandaTask, GraspingTwin):
         goals[:, :, :2], goals[:, :, 2] = places[:, 2:], HEIGHTS
         partial = draws[:, 6] < self.partial_tower_start_prob
         position[partial, 0, :2] = goals[partial, 0, :2] + JITTER * (2.0 * draws[partial, 7:9] - 1)
-        beside = np.abs(position[:, 1, :2] - position[:, 0, :2]).max(axis=1) > 2.0 * HALF
+        between = np.abs(position[:, 1, :2] - position[:, 0, :2])
+        beside, room = between.max(axis=1) > 2.0 * HALF, (between > ROOM).any(axis=1)
         position[partial & beside, 1, 2] = HALF
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
-        self.start_near_grasps(world, mask, draws[:, 9:], partial.astype(int))
+        self.start_near_grasps(world, mask, draws[:, 9:], partial.astype(int), room)
         return goals.reshape(-1, 6)
 
     def achieved(self, world: World, now: Readout) -> Array:

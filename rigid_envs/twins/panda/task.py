@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import Body, Box, Ground, Material, Readout, Scene, World
+from physics.orientation import to_euler
 from rigid_envs.rendering.camera import Camera
 from rigid_envs.tasks.rewards import distance
 from rigid_envs.tasks.task import Bounds
@@ -18,7 +19,7 @@ LIMIT = 10.0  # of every component, as the original's spaces say; its values can
 RANGE = 0.15  # m, largest offset of starts and goals from their middle along x and y
 HALF = 0.02  # m, half the width of a cube
 BEHIND = 0.045  # m, from the object to where the hand is led
-FRICTION = 0.25  # Coulomb's coefficient of cubes and table
+CUBE_FRICTION = 0.25  # Coulomb's coefficient of cubes and table
 
 
 class PandaTask(Twin):
@@ -42,7 +43,7 @@ class PandaTask(Twin):
 
     def scene(self) -> Scene:
         """The table, what lies on it, and the hand."""
-        table = Ground(Material(FRICTION, 0.0), 0.0, "table", OBJECT, OBJECT)
+        table = Ground(Material(CUBE_FRICTION, 0.0), 0.0, "table", OBJECT, OBJECT)
         return Scene(bodies=self.bodies(), statics=[table], drives=[self.hand.drive()])
 
     def act(self, world: World, now: Readout, actions: Array) -> None:
@@ -60,7 +61,7 @@ class PandaTask(Twin):
         for body in range(len(world.scene.bodies)):
             part = out[:, first + 12 * body : first + 12 * (body + 1)]
             part[:, 0:3] = now.position[:, body]
-            part[:, 3:6] = rotation(now.orientation[:, body])
+            part[:, 3:6] = to_euler(now.orientation[:, body])[:, ::-1]  # roll, pitch and yaw
             part[:, 6:9] = now.linear_velocity[:, body]
             part[:, 9:12] = now.angular_velocity[:, body]
 
@@ -106,7 +107,7 @@ class PandaObject(PandaTask):
 
 def cube(name: str, mass: float, height: float) -> Body:
     """A cube of `mass` kg whose centre is `height` m above the table."""
-    material = Material(FRICTION, restitution=0.0)
+    material = Material(CUBE_FRICTION, restitution=0.0)
     return Body(
         Box((HALF,) * 3), mass=mass, position=(0.0, 0.0, height), material=material, name=name,
         group=OBJECT, mask=OBJECT | HAND,
@@ -118,19 +119,3 @@ def observed(hand: ClosedHand | OpenHand, *bodies: str) -> Bounds:
     parts = ("", " rotation", " velocity", " angular velocity")
     names = along_axes(*(f"{body}{part}" for body in bodies for part in parts))
     return components(LIMIT, *along_axes("hand", "hand velocity"), *hand.names, *names)
-
-
-def rotation(orientation: Array) -> Array:
-    """Roll, pitch and yaw [n, 3] rad of quaternions [n, 4], as the originals observe them.
-
-    The rotation is that about the fixed x axis, then the fixed y axis, then the fixed z axis.
-    """
-    x, y, z, w = np.asarray(orientation, dtype=float).T
-    return np.stack(
-        [
-            np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            np.arcsin(np.clip(2.0 * (w * y - x * z), -1.0, 1.0)),
-            np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-        ],
-        axis=1,
-    )

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from rigid_envs.tasks.grasping.pick_and_place import HALF, HIGHEST, MIN_DISTANCE, RANGE, THRESHOLD
+from physics import World
+from rigid_envs.tasks.grasping.hand import Hand
+from rigid_envs.tasks.grasping.pick_and_place import (
+    HALF,
+    HIGHEST,
+    MIN_DISTANCE,
+    RANGE,
+    THRESHOLD,
+    PickAndPlace,
+)
 from tests.rigid_envs.rollout import PICK_AND_PLACE, make, make_vec, steps_of
 from training.scripted import controller_for
 
@@ -79,6 +88,17 @@ def test_training_can_start_around_the_cube():
     assert info["grasp"][near].mean() > 0.9
     with pytest.raises(ValueError, match="near_grasp_start_prob"):
         make(PICK_AND_PLACE, near_grasp_start_prob=1.5)
+
+
+def test_starts_around_a_cube_of_another_size_leave_the_pads_outside():
+    rng, task = np.random.default_rng(0), PickAndPlace(near_grasp_start_prob=1.0)
+    world = World(task.scene(), "balanced", 400, per_world_parameters=True)
+    world.set_parameters(size=rng.uniform(0.5, 1.3, (400, 1)))
+    task.start(world, np.ones(400, dtype=bool), rng.random((400, task.draw_count)))
+    half = HALF * world.parameters.size[:, :, None]
+    between = np.abs(world.drive_position - world.position)
+    assert (Hand.PAD + half - between).min(axis=2).max() < 1e-6
+    assert world.drive_position[:, :, 2].min() > Hand.PAD
 
 
 def test_the_dense_reward_leads_to_the_cube_and_to_the_goal():

@@ -51,8 +51,15 @@ def test_starts_and_goals_have_the_distributions_of_the_original():
             a, b = (x.astype(float).round(5) for x in (here[key], getattr(there, key)))
             spread = np.ptp(b, axis=0)
             constant = spread < 1e-4
-            # what doesn't vary is the same, but for the small motions at the originals' starts
-            assert np.abs(a - b)[:, constant].max(initial=0.0) < 0.03, twin.original
+            # what doesn't vary is the same; but Fetch's fingers and FetchSlide's puck move a bit
+            names = [name for name, *_ in twin.bounds]
+            moving = [
+                key == "observation" and twin.original.startswith("Fetch")
+                and any(part in name for part in ("finger", "rotation", "angular"))
+                for name in names[: a.shape[1]]
+            ]  # fmt: skip
+            same = np.abs(a - b).max(axis=0) < np.where(moving, 0.02, 1e-4)
+            assert same[constant].all(), (twin.original, key)
             for c in np.flatnonzero(~constant):
                 found.append((ks_2samp(a[:, c], b[:, c]).pvalue, twin.original, key, c))
                 assert np.ptp(a[:, c]) == pytest.approx(spread[c], rel=0.1), found[-1]

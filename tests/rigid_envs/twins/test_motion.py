@@ -15,17 +15,15 @@ from benchmarks.twins.replay import (
     replay,
 )
 from physics import Box, Drive, Scene, World
+from physics.orientation import to_euler
 from rigid_envs.twins import TWINS
 from rigid_envs.twins.arms.arm import make_work
 from rigid_envs.twins.arms.chain import locate
 from rigid_envs.twins.arms.work import JOINTS
-from rigid_envs.twins.fetch.hand import CREEPING as HAND_CREEPING
-from rigid_envs.twins.fetch.hand import RESTING, braked
-from rigid_envs.twins.fetch.hand import SLIDING as HAND_SLIDING
+from rigid_envs.twins.fetch.hand import CREEPING, RESTING, SLIDING, braked
 from rigid_envs.twins.fetch.task import rotation as fetch_rotation
 from rigid_envs.twins.panda import inverse_kinematics
 from rigid_envs.twins.panda.arm import CHAIN, NEUTRAL
-from rigid_envs.twins.panda.task import rotation as panda_rotation
 from rigid_envs.twins.servo import Servo
 
 
@@ -74,8 +72,8 @@ def test_a_hand_that_presses_on_the_table_holds_its_fingers():
 def test_a_hand_slides_as_coulomb_says_and_creeps():
     free = np.array([[0.03, 0.0, -1e-4], [0.0, 1e-4, -0.02], [0.03, 0.0, 0.01], [0.02, 0.0, -0.02]])
     lost = (1.0 - braked(np.full(4, RESTING), free)) * np.abs(free[:, :2])
-    assert lost[0] == pytest.approx([HAND_SLIDING * 1e-4, 0.0], rel=1e-3, abs=1e-8)
-    assert lost[1] == pytest.approx([0.0, HAND_CREEPING * 1e-4], rel=1e-3, abs=1e-8)
+    assert lost[0] == pytest.approx([SLIDING * 1e-4, 0.0], rel=1e-3, abs=1e-8)
+    assert lost[1] == pytest.approx([0.0, CREEPING * 1e-4], rel=1e-3, abs=1e-8)
     assert lost[2] == pytest.approx([0.0, 0.0], abs=1e-8)  # it rises
     # a hand 2 cm above the table presses by nothing, one 1 cm above it by half as much
     kept = braked(np.array([RESTING + 0.02, RESTING + 0.01]), free[[3, 3]])
@@ -173,8 +171,32 @@ def test_angles_are_those_of_the_originals():
 
         X, Y, Z = turns(*fetch_rotation(q)[0])
         assert pytest.approx(R) == X @ Y @ Z
-        X, Y, Z = turns(*panda_rotation(q)[0])
+        X, Y, Z = turns(*to_euler(q)[0, ::-1])
         assert pytest.approx(R) == Z @ Y @ X
+
+
+@pytest.mark.parametrize("name", ["fetch_pick_and_place", "panda_pick_and_place", "panda_stack"])
+def test_fingers_of_starts_around_the_object_are_in_no_object(name):
+    task = TWINS[name](near_grasp_start_prob=1.0)
+    draws = np.random.default_rng(0).random((400, task.draw_count))
+    world = World(task.scene(), "balanced", 400)
+    task.start(world, np.ones(400, dtype=bool), draws)
+    size = np.array(task.hand.drive().shape.half_extents)
+    between = np.abs(world.drive_position[:, :, None] - world.position[:, None])
+    overlap = (size + task.half - between).min(axis=-1)
+    # boxes of Fetch's fingers are 1 mm larger than the fingers, as their contacts are
+    assert overlap.max() < 1.1e-3
+    assert np.sort(overlap.max(axis=(1, 2)))[200] > -0.02  # most do begin around an object
+
+
+def test_a_fetch_hand_starts_as_fast_as_the_original():
+    recording = Recording.load("fetch-pushes")
+    task = TWINS["fetch_push"]()
+    world = World(task.scene(), "balanced", 1)
+    task.start(world, np.ones(1, dtype=bool), np.full((1, task.draw_count), 0.1))
+    there = recording.observations[0, 0, 20:23] / 0.04
+    assert np.abs(there).max() > 0.012
+    assert task.hand.velocity(world.read())[0] == pytest.approx(there, abs=3e-4)
 
 
 def test_starts_around_the_object_are_for_training_only():

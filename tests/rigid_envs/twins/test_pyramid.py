@@ -8,7 +8,7 @@ import pytest
 from benchmarks.twins.identify import Slides
 from benchmarks.twins.recordings import Recording
 from rigid_envs.twins.fetch.pyramid import friction
-from rigid_envs.twins.fetch.slide import CREEPING, GLIDING, SLIDING, braking, predicted
+from rigid_envs.twins.fetch.slide import DAMPING, DECELERATION, GLIDING, braking, predicted
 
 
 def test_friction_is_the_sum_of_four_forces_that_share_its_limit():
@@ -32,20 +32,20 @@ def test_friction_is_the_sum_of_four_forces_that_share_its_limit():
 def test_a_puck_slides_creeps_and_glides():
     fast = np.array([[1.0, 0.0], [0.0, -1.0], [0.8, 0.8], [1.2, 0.3]])
     found = braking(fast)
-    assert np.abs(found).sum(axis=1) == pytest.approx(np.full(4, SLIDING))
-    assert found[2] == pytest.approx([-0.5 * SLIDING, -0.5 * SLIDING])
-    assert found[3] == pytest.approx([-SLIDING, 0.0])  # the faster component first
+    assert np.abs(found).sum(axis=1) == pytest.approx(np.full(4, DECELERATION))
+    assert found[2] == pytest.approx([-0.5 * DECELERATION, -0.5 * DECELERATION])
+    assert found[3] == pytest.approx([-DECELERATION, 0.0])  # the faster component first
     slow = np.array([[GLIDING, 0.0], [0.0, 0.5 * GLIDING], [0.0, 0.0]])
     assert braking(slow) == pytest.approx(np.zeros((3, 2)))  # it glides on, or rests
     assert braking((GLIDING + 0.02) * np.array([[0.6, -0.8]]))[0] == pytest.approx(
-        0.02 * CREEPING * np.array([-0.6, 0.8])
+        0.02 * DAMPING * np.array([-0.6, 0.8])
     )
 
 
 def test_where_a_puck_will_be_follows_from_the_law():
     # along an axis, with w the speed above that of gliding: w' = -s, from w = 2 s / k on
     # w' = -(s + k w) / 3, and from w = s / (2 k) on w' = -k w
-    v, s, k, g, time = 1.0, SLIDING, CREEPING, GLIDING, 1.6
+    v, s, k, g, time = 1.0, DECELERATION, DAMPING, GLIDING, 1.6
     first = (v - g - 2.0 * s / k) / s
     far = ((v - g) ** 2 - (2.0 * s / k) ** 2) / (2.0 * s)
     second = 3.0 * math.log(2.0) / k
@@ -57,7 +57,7 @@ def test_where_a_puck_will_be_follows_from_the_law():
 
 def test_pucks_end_where_those_of_the_original_do():
     slides = Slides.of(Recording.load("fetch-slides"))
-    miss = slides.miss(SLIDING, CREEPING, GLIDING)
+    miss = slides.miss(DECELERATION, DAMPING, GLIDING)
     assert len(miss) >= 30
     far = np.linalg.norm(slides.end - slides.position, axis=1)
     assert np.median(np.linalg.norm(miss, axis=1)) < 0.017 < 0.1 * np.median(far)
