@@ -91,7 +91,7 @@ class PandaStack(PandaTask, GraspingTwin):
         partial = draws[:, 6] < self.partial_tower_start_prob
         position[partial, 0, :2] = goals[partial, 0, :2] + JITTER * (2.0 * draws[partial, 7:9] - 1)
         between = np.abs(position[:, 1, :2] - position[:, 0, :2])
-        beside, room = between.max(axis=1) > 2.0 * HALF, (between > ROOM).any(axis=1)
+        beside, room = between.max(axis=1) > 2.0 * HALF, np.any(between > ROOM, axis=1)
         position[partial & beside, 1, 2] = HALF
         world.reset(mask)
         world.set_state(position=position, worlds=mask)
