@@ -89,31 +89,26 @@ REPLAYED = {
 
 
 def summary() -> list[str]:
-    """A line for each recording: the errors of the hand after some steps, or of the object."""
+    """A line for each recording: errors of the hand or fingers; of objects, at two presets."""
     lines = []
     for name, twin in REPLAYED.items():
         recording = Recording.load(name)
         found = replay(recording, TWINS[twin]())
-        parts = [f"{name:15}"]
         if name == "fetch-grips":
-            errors = 1e3 * finger_errors(recording, found)
-            parts.append(
-                f"fingers after the last step: median {np.median(errors):6.2f} mm, at most "
-                f"{errors.max():6.2f} mm"
-            )
+            errors = finger_errors(recording, found)
+            lines.append(_line(name, "fingers after the last step", errors))
         elif len(found.body):
-            errors = 1e3 * body_errors(recording, found, OBJECT[name[:5]])
-            moved = np.linalg.norm(np.diff(found.body[[0, -1]], axis=0)[0], axis=1) > 0.01
-            parts.append(
-                f"object after the last step: median {np.median(errors):6.1f} mm, 90 % within "
-                f"{np.quantile(errors, 0.9):6.1f} mm; {moved.sum()} of {len(moved)} moved"
-            )
+            for fidelity in ("balanced", "solid"):
+                found = replay(recording, TWINS[twin](), fidelity)
+                errors = body_errors(recording, found, OBJECT[name[:5]])
+                lines.append(_line(name, f"object after the last step, {fidelity}", errors))
         else:
             steps = PRESSED if name.endswith("presses") else 12
-            errors = 1e3 * hand_errors(recording, found, steps)
-            parts.append(
-                f"hand after {steps} steps: median {np.median(errors):6.2f} mm, at most "
-                f"{errors.max():6.2f} mm"
-            )
-        lines.append(" ".join(parts))
+            errors = hand_errors(recording, found, steps)
+            lines.append(_line(name, f"hand after {steps} steps", errors))
     return lines
+
+
+def _line(name: str, what: str, errors: Array) -> str:
+    median, most = 1e3 * np.median(errors), 1e3 * np.quantile(errors, 0.9)
+    return f"{name:14} {what:38} median {median:6.2f} mm, 90 % within {most:6.2f} mm"
