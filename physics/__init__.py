@@ -19,6 +19,7 @@ from physics.scene.shapes import Box, Capsule, Sphere
 from physics.scene.solids import Body, Ground, Static
 from physics.scene.torus import Torus
 from physics.step.readout import Readout
+from physics.tuning.explain import explain
 from physics.tuning.tune import Tuned, tune
 from physics.world import Snapshot, World
 
@@ -61,5 +62,6 @@ __all__ = [
     "Tuned",
     "Weld",
     "World",
+    "explain",
     "tune",
 ]

@@ -2,13 +2,10 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from physics.scene import saving
 from physics.scene.validation import choice, integer, number, positive
-
-if TYPE_CHECKING:
-    from physics.scene.scene import Scene
 
 LAWS = ("spring", "impulse")
 SOLVERS = ("gauss_seidel", "newton")
@@ -182,18 +179,6 @@ class Fidelity:
                     f"{getattr(self, name)!r}: {why}; or use time_control='fixed' with a shorter "
                     "substep"
                 )
-
-    def explain(self, scene: "Scene", *, costs: bool = True) -> str:
-        """What this fidelity models of a scene and leaves out, its limits and what its parts cost.
-
-        Args:
-            scene: the scene.
-            costs: measure costs: a second, and up to a minute where kernels are compiled.
-        """
-        # the engine's floors import downwards; only this method of convenience looks up
-        from physics.tuning.explain import explain
-
-        return explain(scene, self, costs=costs)
 
     def to_json(self) -> str:
         """The fidelity as JSON text, from which `from_json` builds an equal one."""

@@ -18,10 +18,11 @@ from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features, general
 from physics.model.tables import Model
 from physics.scene.drives import Drive
-from physics.scene.fidelity import NEWTON, PRESETS, Fidelity
+from physics.scene.fidelity import NEWTON, PRESETS, Fidelity, resolve
 from physics.scene.mesh import Mesh
 from physics.scene.scene import Scene
 from physics.scene.solids import Body, Ground
+from physics.scene.validation import instance
 from physics.tuning.candidates import can_touch, safe_speed
 from physics.tuning.description import code
 from physics.tuning.motion import side_by_side
@@ -45,7 +46,7 @@ _ORDERS = {
 }
 
 
-def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
+def explain(scene: Scene, fidelity: str | Fidelity = "balanced", *, costs: bool = True) -> str:
     """What a fidelity means for a scene, as text.
 
     It says what is modelled and what is left out, the largest stable step, the stiffness of
@@ -53,14 +54,14 @@ def explain(scene: Scene, fidelity: Fidelity, *, costs: bool = True) -> str:
 
     Args:
         scene: the scene.
-        fidelity: the fidelity.
+        fidelity: a preset's name or a Fidelity.
         costs: measure costs, which takes a second, and up to a minute where kernels are compiled.
 
     Raises:
-        TypeError: the scene is none.
+        TypeError: the scene is none, or the fidelity.
+        ValueError: no preset has this name.
     """
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene must be Scene, got {scene!r}")
+    scene, fidelity = instance("scene", scene, Scene), resolve(fidelity)
     few = _kinds(scene)
     model, features = build(few, fidelity)
     lines = [code(fidelity), f"kernel: {_kernel(features)}", "", "Models"]

@@ -10,7 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from physics import PRESETS, Body, Box, Cylinder, Fidelity, Ground, Material, Scene, Sphere
+from physics import (
+    PRESETS,
+    Body,
+    Box,
+    Cylinder,
+    Fidelity,
+    Ground,
+    Material,
+    Scene,
+    Sphere,
+    explain,
+)
 from physics.analysis.standing import base, tipping
 from physics.model.rocking import outward_sides
 from physics.reference.loads import (
@@ -147,7 +158,7 @@ def test_explain_says_where_a_body_that_stands_tips_and_what_would_be_better():
     block = Body(Box((0.02, 0.02, 0.06)), mass=0.1, position=(0, 0, 0.06), material=Material(1.0))
     scene = Scene([block], [Ground(material=Material(1.0))])
     predicted = predicted_tipping("fast")
-    text = PRESETS["fast"].explain(scene, costs=False)
+    text = explain(scene, PRESETS["fast"], costs=False)
     line = re.search(r"tips at 18\.4°.*here at ([\d.]+)°.*from ([\d.]+)°", text)
     assert float(line[1]) == pytest.approx(math.degrees(predicted.gradual), abs=0.05)
     assert float(line[2]) == pytest.approx(math.degrees(predicted.sudden), abs=0.05)
@@ -155,8 +166,8 @@ def test_explain_says_where_a_body_that_stands_tips_and_what_would_be_better():
     lost = predicted_tipping(replace(PRESETS["fast"], substep=float(better[1])))
     assert 1.0 - lost.sudden / lost.rigid == pytest.approx(0.05, rel=0.1)
     assert eval(better[2]) == Fidelity(law="impulse", contact_resolution=50.0, solver="newton")
-    assert "to lose" not in NEWTON.explain(scene, costs=False)
+    assert "to lose" not in explain(scene, NEWTON, costs=False)
     cube = Scene([replace(block, shape=Box((0.02,) * 3), material=Material(0.25))], [Ground()])
-    assert "half its friction" in PRESETS["fast"].explain(cube, costs=False)
+    assert "half its friction" in explain(cube, PRESETS["fast"], costs=False)
     ball = Scene([Body(Sphere(0.02), mass=0.1, position=(0, 0, 0.02))], [Ground()])
-    assert "Standing" not in PRESETS["fast"].explain(ball, costs=False)
+    assert "Standing" not in explain(ball, PRESETS["fast"], costs=False)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from physics import PRESETS, Box, Fidelity, Ground, Mesh, Particles, Scene, Sphere
+from physics import PRESETS, Box, Fidelity, Ground, Mesh, Particles, Scene, Sphere, explain
 from physics.model.pairs import Layout
 from physics.reference import blocks, meshes, truths
 from physics.scene.fidelity import NEWTON
@@ -105,7 +105,7 @@ def test_springs_rock_a_slim_block_right_at_the_substep_that_explain_names():
     """Edges sink: `balanced` loses 9 % too much."""
     assert blocks.rocking("balanced").mean() < 0.95 * blocks.ROCKING
     block = truths.Body(Box((blocks.BLOCK[0], *blocks.BLOCK)), mass=truths.MASS)
-    text = PRESETS["balanced"].explain(Scene([block], [Ground()]), costs=False)
+    text = explain(Scene([block], [Ground()]), PRESETS["balanced"], costs=False)
     substep = re.search("at most 5 % of that angle by sinking: substep=([0-9.e-]+)", text)[1]
     better = replace(PRESETS["balanced"], substep=float(substep))
     assert blocks.rocking(better).mean() == pytest.approx(blocks.ROCKING, rel=0.02)
