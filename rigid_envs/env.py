@@ -104,8 +104,9 @@ class RigidEnv(gym.Env[Observation, Array]):
         )
         self._limit_is_default = max_episode_steps is None
         self._pictures = Pictures(
-            self._runner, render_mode, width, height, camera, show_forces, show_particles
-        )
+            self._runner, render_mode, width, height, camera, show_forces, show_particles,
+            pixels=obs_type.startswith("pixels"),
+        )  # fmt: skip
         self.observation_space: Any = self._runner.observation_space
         self.action_space = self._runner.action_space
 

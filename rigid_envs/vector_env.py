@@ -126,15 +126,9 @@ class RigidVectorEnv(VectorEnv[Observation, Array, Array]):
         except MemoryError as error:
             raise MemoryError(f"num_envs={self.num_envs}: {error}") from None
         self._pictures = Pictures(
-            self._runner,
-            render_mode,
-            width,
-            height,
-            camera,
-            show_forces,
-            show_particles,
-            render_worlds,
-        )
+            self._runner, render_mode, width, height, camera, show_forces, show_particles,
+            render_worlds, obs_type.startswith("pixels"),
+        )  # fmt: skip
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self.single_observation_space = self._runner.observation_space
         self.single_action_space = self._runner.action_space

@@ -73,7 +73,7 @@ class SideBySide:
         runner, renderer = self._runner, self._renderer
         solids: list[Array] = []
         glass: list[Array] = []
-        for item in scene_view.items(runner, np.arange(runner.count)):
+        for item in scene_view.items(runner.world, np.arange(runner.count)):
             turn = rotation_matrix(item.orientation)[:, None]
             place = (item.position + self._offsets)[:, None]
             table = placed(shape_primitives(item.shape), place, turn)

@@ -1,20 +1,19 @@
 """What is observed of the worlds: its space, and its values after each step."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from physics import Readout
+from physics import Readout, World
 from physics.compiler.jit import columns
 from physics.scene.validation import instance
 from rigid_envs.episodes.columns import Observed, split
-from rigid_envs.episodes.pixels import Pixels, PixelSettings
+from rigid_envs.episodes.pixels import Pixels
+from rigid_envs.episodes.randomization import Randomization
 from rigid_envs.episodes.task_checks import check_goals, check_written
-from rigid_envs.tasks.task import Bounds
-
-if TYPE_CHECKING:
-    from rigid_envs.episodes.runner import Runner
+from rigid_envs.tasks.goals import Measure
+from rigid_envs.tasks.task import Bounds, Task
 
 Array = np.ndarray
 Observation = Any
@@ -22,20 +21,21 @@ Observation = Any
 
 
 class Observations:
-    """Observations of a runner's worlds.
+    """Observations of worlds.
 
     Args:
-        runner: whose worlds.
+        task: of the episodes.
+        randomization: of their parameters.
         parameters: whether the drawn parameters are appended, see `Randomization`.
         guide: whether the task's guide is appended, see `Task.guide`.
-        pixels: what pixels are observed; None if only the state is.
+        pixels: what draws the observed pixels; None if only the state is observed.
+        keeps_state: whether the state is observed beside pixels.
         flat: whether state and goals are observed as one array.
 
     Attributes:
         parameters: see above.
         bounds: (name, unit, low, high) of each component of the state.
         space: of one world's observation.
-        pixels: what draws the observed pixels, if any are.
 
     Raises:
         TypeError, ValueError: `parameters` or `guide` is no bool, or no parameters are drawn.
@@ -43,20 +43,22 @@ class Observations:
 
     def __init__(
         self,
-        runner: "Runner",
+        task: Task,
+        randomization: Randomization,
         parameters: bool,
         guide: bool,
-        pixels: PixelSettings | None,
+        pixels: Pixels | None,
+        keeps_state: bool,
         flat: bool,
     ) -> None:
-        self._runner, self._task = runner, runner.task
+        self._task, self._randomization = task, randomization
         self.parameters: bool = instance("observe_parameters", parameters, bool)
-        if self.parameters and not runner.randomization.bounds:
+        if self.parameters and not randomization.bounds:
             raise ValueError(
                 "observe_parameters needs randomize: its ranges are the bounds of the observed "
                 "parameters"
             )
-        parameter_bounds = runner.randomization.bounds if self.parameters else ()
+        parameter_bounds = randomization.bounds if self.parameters else ()
         self._guide: bool = instance("observe_task_guide", guide, bool)
         guide_bounds = self._task.guide_bounds if self._guide else ()
         # options append components, so that the indices of the others do not change
@@ -72,13 +74,11 @@ class Observations:
             "achieved_goal": spaces.Box(goal_low, goal_high, dtype=dtype),
             "desired_goal": spaces.Box(goal_low, goal_high, dtype=dtype),
         }
-        self._keeps_state = pixels is not None and pixels.keeps_state
-        self.pixels: Pixels | None = None
+        self._pixels, self._keeps_state = pixels, keeps_state
         if pixels is not None:
-            self.pixels = Pixels(runner, pixels)
-            if self._keeps_state:
+            if keeps_state:
                 observed["state"] = observed["observation"]
-            observed["observation"] = self.pixels.space
+            observed["observation"] = pixels.space
         self._flat = flat
         self.space: spaces.Space[Any] = spaces.Dict(observed)
         if flat:
@@ -89,21 +89,23 @@ class Observations:
         self._checked = False
 
     def observe(
-        self, now: Readout, desired: Array, joins: bool
+        self, world: World, now: Readout, desired: Array, joins: bool, measure: Measure
     ) -> tuple[Observation, Observed, Array]:
         """Observations of all worlds.
 
         The first ones are checked: a task must write every component.
 
         Args:
-            now: the worlds' state.
+            world: the worlds.
+            now: their state.
             desired: [count, goal], the desired goals.
             joins: whether to write `Observed.goals`.
+            measure: of the goal distance.
 
         Returns:
             The observations, what else `split` tells, and the achieved goals [count, goal].
         """
-        task, world, count = self._task, self._runner.world, self._runner.count
+        task, count = self._task, world.count
         goal_start, task_end = len(self.bounds), len(task.bounds)
         guide_start = goal_start - (len(task.guide_bounds) if self._guide else 0)
         table = columns((len(self._low),), count, task.dtype)
@@ -114,7 +116,7 @@ class Observations:
         if not self._checked:
             check_written(task, "observe", task.bounds, values[:, :task_end])
         if self.parameters:
-            values[:, task_end:guide_start] = self._runner.randomization.observed
+            values[:, task_end:guide_start] = self._randomization.observed
         achieved = values[:, goal_start:]
         achieved[...] = check_goals(task, "achieved", task.achieved(world, now), count)
         if self._guide:
@@ -123,7 +125,7 @@ class Observations:
             if not self._checked:
                 check_written(task, "guide", task.guide_bounds, guide)
         self._checked = True
-        rows = split(table, self._low, self._high, desired, joins, self._runner.reward.measure)
+        rows = split(table, self._low, self._high, desired, joins, measure)
         if self._flat:
             parts = (rows.observation, rows.achieved, rows.desired)
             return np.concatenate(parts, axis=1), rows, achieved
@@ -133,10 +135,10 @@ class Observations:
             "achieved_goal": rows.achieved,
             "desired_goal": rows.desired,
         }
-        if self.pixels:
+        if self._pixels:
             if self._keeps_state:
                 observation["state"] = rows.observation
-            observation["observation"] = self.pixels.observe()
+            observation["observation"] = self._pixels.observe(world)
         return observation, rows, achieved
 
 

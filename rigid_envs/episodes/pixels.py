@@ -1,17 +1,16 @@
 """Pixels as observations: small pictures of every world, stacked over the last steps."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
+from physics import World
 from physics.scene.validation import choice, integer
 from rigid_envs.rendering import scene_view
 from rigid_envs.rendering.cameras import choose_camera
 from rigid_envs.rendering.renderer import Frames, Renderer
-
-if TYPE_CHECKING:
-    from rigid_envs.episodes.runner import Runner
+from rigid_envs.tasks.task import Task
 
 Array = np.ndarray
 Observation = dict[str, Array]
@@ -81,7 +80,7 @@ def pixel_settings(
 
 
 class Pixels:
-    """Pictures of a runner's worlds as observations.
+    """Pictures of worlds as observations.
 
     The markers of goals are not drawn: goals stay numbers, so that learners that relabel them (HER)
     see no picture that shows another goal. A world's pictures depend on its own episode alone.
@@ -94,23 +93,22 @@ class Pixels:
     stands for those before it.
 
     Args:
-        runner: whose worlds.
         settings: see `PixelSettings`.
+        task: of the episodes.
+        world: the worlds at the start.
 
     Attributes:
         space: of one world's pixels.
     """
 
-    def __init__(self, runner: "Runner", settings: PixelSettings) -> None:
-        self._runner, self._kinds, self._stack = runner, settings.kinds, settings.frame_stack
+    def __init__(self, settings: PixelSettings, task: Task, world: World) -> None:
+        self._kinds, self._stack = settings.kinds, settings.frame_stack
         width, height = settings.width, settings.height
-        camera = choose_camera(settings.camera, runner.task, width / height)
-        floor = scene_view.floor(runner.world.scene)
+        camera = choose_camera(settings.camera, task, width / height)
+        floor = scene_view.floor(world.scene)
         self._ground = floor.solid
-        self._renderer = Renderer(
-            width, height, camera, floor=floor.height, threads=runner.world.threads
-        )
-        solids = len(runner.world.scene.solid_names)
+        self._renderer = Renderer(width, height, camera, floor=floor.height, threads=world.threads)
+        solids = len(world.scene.solid_names)
         if "segmentation" in self._kinds and solids > MOST_SOLIDS:
             raise ValueError(
                 f'pixels="segmentation" tells at most {MOST_SOLIDS} solids apart, got {solids}'
@@ -118,10 +116,10 @@ class Pixels:
         self._channels = sum(CHANNELS[kind] for kind in self._kinds)
         shape = (height, width, self._channels * self._stack)
         self.space = spaces.Box(0, 255, shape, np.uint8)
-        self._frames = np.zeros((runner.count, *shape), np.uint8)
+        self._frames = np.zeros((world.count, *shape), np.uint8)
         # of each world, whether its picture is old, whether it has made a step since, and whether
         # its episode has just started
-        self._old, self._moved, self._starts = np.ones((3, runner.count), dtype=bool)
+        self._old, self._moved, self._starts = np.ones((3, world.count), dtype=bool)
 
     def stepped(self) -> None:
         """All worlds have made a step."""
@@ -136,11 +134,11 @@ class Pixels:
         self._old |= mask
         self._starts |= mask
 
-    def observe(self) -> Array:
+    def observe(self, world: World) -> Array:
         """Pixels [count, height, width, channels]; draws only what has changed since the last."""
         worlds = np.flatnonzero(self._old)
         if len(worlds):
-            new, channels = self._draw(worlds), self._channels
+            new, channels = self._draw(world, worlds), self._channels
             if self._stack == 1:
                 self._frames[worlds] = new
             else:
@@ -173,9 +171,9 @@ class Pixels:
         self._frames[:] = state["frames"]
         self._old[:], self._moved[:], self._starts[:] = state["flags"]
 
-    def _draw(self, worlds: Array) -> Array:
+    def _draw(self, world: World, worlds: Array) -> Array:
         frames = self._renderer.frames(
-            scene_view.items(self._runner, worlds, observed=True),
+            scene_view.items(world, worlds, observed=True),
             worlds=len(worlds),
             rgb="rgb" in self._kinds,
             depth="depth" in self._kinds,

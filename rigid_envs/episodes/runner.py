@@ -109,11 +109,12 @@ class Runner:
         self._rewards: tuple[Reward | None, Reward] = None, self.task.reward  # see `reward`
         self._has_task_terms = bool(self.reward.task_terms)
 
+        self._pixels = Pixels(pixels, self.task, self.world) if pixels is not None else None
         self._observations = Observations(
-            self, observe_parameters, observe_task_guide, pixels, flat
-        )
+            self.task, self.randomization, observe_parameters, observe_task_guide, self._pixels,
+            pixels is not None and pixels.keeps_state, flat,
+        )  # fmt: skip
         self.bounds, self.observation_space = self._observations.bounds, self._observations.space
-        self._pixels = self._observations.pixels
         size = (len(self.task.actions),)
         self.action_space = spaces.Box(-1.0, 1.0, size, dtype=np.float32)
 
@@ -275,11 +276,6 @@ class Runner:
         new.contacts(0)
 
     @property
-    def pixels(self) -> Pixels | None:
-        """What draws the observed pixels, if any are."""
-        return self._pixels
-
-    @property
     def seeds(self) -> Array:
         """[count] seed of each world; -1 of one that has had none yet."""
         return np.where(self._episodes < 0, -1, self._seeds)
@@ -316,7 +312,9 @@ class Runner:
         goals that it gets.
         """
         joins = self.reward_type == "dense" and self._has_task_terms
-        observation, rows, achieved = self._observations.observe(self._now, self._goals, joins)
+        observation, rows, achieved = self._observations.observe(
+            self.world, self._now, self._goals, joins, self.reward.measure
+        )
         self._goal_distance = rows.goal_distance
         success: Array = self.reward.success(self._goal_distance)
         terms = self.task.terms(self.world, self._now, achieved, self._goals, self._goal_distance)

@@ -1,17 +1,15 @@
 """Cameras by name, and cameras from what a user gives."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from physics.scene.validation import vector
 from rigid_envs.rendering.camera import Camera
 
-if TYPE_CHECKING:
-    from rigid_envs.tasks.task import Task
-
 Array = np.ndarray
+Point = tuple[float, float, float]
 
 # azimuth and elevation in degrees of the eye, about what the task's own camera looks at
 NAMED = {"front": (-90.0, 20.0), "side": (0.0, 20.0), "back": (90.0, 20.0), "top": (-90.0, 90.0)}
@@ -24,7 +22,14 @@ FITS = 8  # moves of a camera to the middle of what it sees, each of which nearl
 LEVEL = 5.0  # degrees, least elevation, so that the eye stays above the ground
 
 
-def choose_camera(given: Any, task: "Task", shape: float = 1.0) -> Camera:
+class Seen(Protocol):
+    """What cameras know of a task: its own camera, and a box of its starts and goals or None."""
+
+    camera: Camera
+    workspace: tuple[Point, Point] | None
+
+
+def choose_camera(given: Any, task: Seen, shape: float = 1.0) -> Camera:
     """A camera from a name, from settings, or the task's own.
 
     Args:

@@ -1,8 +1,8 @@
-"""Pictures of a runner's worlds: what both kinds of environment share."""
+"""Pictures of running episodes: what both kinds of environment share."""
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,9 +14,6 @@ from rigid_envs.rendering.cameras import FOLLOW, choose_camera, fitted, followin
 from rigid_envs.rendering.renderer import Renderer, grid
 from rigid_envs.rendering.view import Ghost
 from rigid_envs.rendering.window import Window, check_display
-
-if TYPE_CHECKING:
-    from rigid_envs.episodes.runner import Runner
 
 Array = np.ndarray
 
@@ -34,7 +31,7 @@ class Pictures:
     Warns if a size of frames is given where only observed pixels are drawn.
 
     Args:
-        runner: whose worlds.
+        shown: the episodes.
         mode: None, "rgb_array" or "human".
         width: of a frame in pixels.
         height: of a frame in pixels.
@@ -42,6 +39,7 @@ class Pictures:
         show_forces: draw contact forces.
         show_particles: draw what touches in place of exact shapes.
         worlds: how many to draw at most; if None all of them, or `IN_WINDOW` in a window.
+        pixels: whether pixels are observed.
 
     Attributes:
         camera: where to look from; with "follow" the task's camera, which each frame moves.
@@ -52,7 +50,7 @@ class Pictures:
 
     def __init__(
         self,
-        runner: "Runner",
+        shown: scene_view.Shown,
         mode: str | None,
         width: int = SIZE,
         height: int = SIZE,
@@ -60,27 +58,28 @@ class Pictures:
         show_forces: bool = False,
         show_particles: bool = False,
         worlds: int | None = None,
+        pixels: bool = False,
     ) -> None:
         """Checks all arguments. A window opens with its first picture."""
         if mode is not None:
             choice("render_mode", mode, RENDER_MODES)
-        self._runner, self._mode = runner, mode
+        self._shown, self._mode = shown, mode
         self._show_forces: bool = instance("show_forces", show_forces, bool)
         self._show_particles: bool = instance("show_particles", show_particles, bool)
         self._width = integer("width", width, low=LEAST, high=MOST)
         self._height = integer("height", height, low=LEAST, high=MOST)
-        self.camera = choose_camera(camera, runner.task, self._width / self._height)
+        self.camera = choose_camera(camera, shown.task, self._width / self._height)
         self._follows = isinstance(camera, str) and camera == FOLLOW
-        self._floor = scene_view.floor(runner.world.scene).height
+        self._floor = scene_view.floor(shown.world.scene).height
         if worlds is None:
-            worlds = IN_WINDOW if mode == "human" else runner.count
-        self._count = min(integer("render_worlds", worlds, low=1), runner.count)
+            worlds = IN_WINDOW if mode == "human" else shown.count
+        self._count = min(integer("render_worlds", worlds, low=1), shown.count)
         self._renderer: Renderer | None = None
         self._window: Window | None = None
         if mode == "human":
             check_display()
         self._warned = False
-        if mode is None and runner.pixels is not None and (width, height) != (SIZE, SIZE):
+        if mode is None and pixels and (width, height) != (SIZE, SIZE):
             gym.logger.warn(
                 f"width={width} and height={height} are of frames of render(), which needs a "
                 "render_mode; the size of observed pixels is pixel_size=..."
@@ -92,13 +91,13 @@ class Pictures:
         Args:
             arms: whether what carries the drives is among the solids.
         """
-        scene, ends = self._runner.world.scene, []
+        scene, ends = self._shown.world.scene, []
         statics = len(scene.bodies) + len(scene.driven_bodies)
-        for item in scene_view.items(self._runner, np.zeros(1, dtype=np.int64)):
+        for item in scene_view.items(self._shown.world, np.zeros(1, dtype=np.int64)):
             if item.solid < statics and (arms or item.opacity == 1.0):
                 reach = item.shape.reach * float(np.max(item.size))
                 ends += _around(item.position[0], np.full(3, reach))
-        for marker in scene_view.markers(self._runner, 0):
+        for marker in scene_view.markers(self._shown, 0):
             if isinstance(marker, Ghost):
                 ends += _around(marker.position, np.full(3, np.linalg.norm(marker.half_extents)))
             else:  # and the disc on the ground
@@ -109,20 +108,20 @@ class Pictures:
 
     def look(self, camera: Any) -> None:
         """Takes the next frames from another camera, given as to `choose_camera`."""
-        self.camera = choose_camera(camera, self._runner.task, self._width / self._height)
+        self.camera = choose_camera(camera, self._shown.task, self._width / self._height)
         self._follows = isinstance(camera, str) and camera == FOLLOW
         self._renderer = None
 
     def fitted(self, points: Array) -> Camera:
         """The camera from the side of the task's that just sees some points [n, 3] m."""
-        return fitted(self._runner.task.camera, points, self._width / self._height)
+        return fitted(self._shown.task.camera, points, self._width / self._height)
 
     def frames(self) -> tuple[Array, ...]:
         """Pictures [height, width, 3] uint8 of the first worlds."""
-        if self._count < self._runner.count and not self._warned:
+        if self._count < self._shown.count and not self._warned:
             self._warned = True
             gym.logger.warn(
-                f"render() draws render_worlds={self._count} of {self._runner.count} worlds; "
+                f"render() draws render_worlds={self._count} of {self._shown.count} worlds; "
                 "RecordVideo and HumanRendering want a picture of every world"
             )
         return self._draw(self._width, self._height)
@@ -134,7 +133,7 @@ class Pictures:
         width, height = max(round(share * self._width), 1), max(round(share * self._height), 1)
         if self._window is None:
             rows = -(-self._count // columns)
-            title = type(self._runner.task).__name__
+            title = type(self._shown.task).__name__
             self._window = Window(columns * width, rows * height, FPS, title)
         if not self._window.closed:
             self._window.show(grid(self._draw(width, height), columns))
@@ -156,12 +155,12 @@ class Pictures:
         return tuple(self._frames(self._renderer, range(self._count)))
 
     def _looking(self, camera: Camera, width: int, height: int) -> Renderer:
-        threads = self._runner.world.threads
+        threads = self._shown.world.threads
         return Renderer(width, height, camera, floor=self._floor, threads=threads)
 
     def _following(self, shape: float) -> list[Camera]:
         """For each world a camera that follows what is to reach the goal."""
-        engine, task, goals = self._runner.world, self._runner.task, self._runner.goals
+        engine, task, goals = self._shown.world, self._shown.task, self._shown.goals
         if [unit for _, unit, _, _ in task.goal_bounds[:3]] == ["m"] * 3:
             places = task.achieved(engine, engine.read())[: self._count, :3]
             goals = goals[: self._count, :3]
@@ -175,7 +174,9 @@ class Pictures:
 
     def _frames(self, renderer: Renderer, worlds: Sequence[int]) -> Array:
         """[n, height, width, 3] uint8 of some worlds."""
-        items = scene_view.items(self._runner, np.array(worlds), particles=self._show_particles)
+        items = scene_view.items(
+            self._shown.world, np.array(worlds), particles=self._show_particles
+        )
         overlays = [renderer.overlay(*self._beside(world)) for world in worlds]
         rgb = renderer.frames(items, overlays, worlds=len(worlds)).rgb
         assert rgb is not None
@@ -183,9 +184,11 @@ class Pictures:
 
     def _beside(self, world: int) -> tuple[Any, Any]:
         """Markers and forces of a world."""
-        runner, particles = self._runner, self._show_particles
-        arrows = scene_view.forces(runner, world, particles=particles) if self._show_forces else ()
-        return scene_view.markers(runner, world), arrows
+        shown, particles = self._shown, self._show_particles
+        arrows = (
+            scene_view.forces(shown.world, world, particles=particles) if self._show_forces else ()
+        )
+        return scene_view.markers(shown, world), arrows
 
 
 def _around(middle: Array, half: Array) -> list[Array]:

@@ -1,11 +1,11 @@
 """What a world looks like: its solids, goal and contact forces as items that a renderer draws."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from physics import Box, Capsule, Gripper, Ground, Scene, Sphere, Static
+from physics import Box, Capsule, Gripper, Ground, Scene, Sphere, Static, World
 from rigid_envs.rendering.view import (
     BODY_COLORS,
     OBSERVED_COLORS,
@@ -15,9 +15,6 @@ from rigid_envs.rendering.view import (
     Marker,
     Particles,
 )
-
-if TYPE_CHECKING:
-    from rigid_envs.episodes.runner import Runner
 
 Array = np.ndarray
 
@@ -34,6 +31,24 @@ STEM, SLENDER = 0.12, 0.55
 # how far it reaches beyond the fingers, half the bar's height, half the length of the post on it,
 # and the least distance of fingers that the bar is made for
 THIN, ABOVE, BEYOND, BAR, POST, NARROWEST = 0.004, 0.06, 0.01, 0.006, 0.02, 0.1
+
+
+class Shown(Protocol):
+    """Running episodes, as far as pictures show them.
+
+    Attributes:
+        task: of the episodes.
+        world: their worlds at present.
+        count: how many worlds.
+    """
+
+    task: Any
+    world: World
+    count: int
+
+    @property
+    def goals(self) -> Array:
+        """Desired goals [count, goal]."""
 
 
 class Floor(NamedTuple):
@@ -55,19 +70,19 @@ def floor(scene: Scene) -> Floor:
 
 
 def items(
-    runner: "Runner", worlds: Array, *, particles: bool = False, observed: bool = False
+    engine: World, worlds: Array, *, particles: bool = False, observed: bool = False
 ) -> list[Item]:
     """Bodies, drives and statics but the ground, and grippers' arms, each in all of some worlds.
 
     Args:
-        runner: whose worlds.
-        worlds: [n], indices.
+        engine: the worlds.
+        worlds: [n], indices of those to show.
         particles: whether to add what the solids touch with.
         observed: whether policies observe them: in the colours that these have learned from, and
             with opaque rods and arms, which people see through, as nothing touches them.
     """
     colors, see_through = (OBSERVED_COLORS, 1.0) if observed else (BODY_COLORS, ARM_OPACITY)
-    engine, scene = runner.world, runner.world.scene
+    scene = engine.scene
     position, orientation = engine.position[worlds], engine.orientation[worlds]
     tools, count = engine.drive_position[worlds], len(worlds)
     sizes = np.ones((count, len(scene.bodies)))
@@ -76,7 +91,7 @@ def items(
     upright = np.tile(UPRIGHT, (count, 1))
 
     def item(k: int, shape: Any, place: Array, turn: Array, color: Color, size: Any = 1.0) -> Item:
-        balls = _particles(runner, k, shape) if particles else None
+        balls = _particles(engine, k, shape) if particles else None
         return Item(shape, place, turn, color, balls, k, size)
 
     found = [
@@ -106,19 +121,18 @@ def items(
     return found + [replace(arm, opacity=see_through) for arm in arms]
 
 
-def markers(runner: "Runner", world: int) -> list[Marker]:
+def markers(shown: Shown, world: int) -> list[Marker]:
     """Goal and other markers of one world, as its task defines them."""
-    goal = runner.goals[world].astype(float)
-    return list(runner.task.markers(runner.world, world, goal))
+    return list(shown.task.markers(shown.world, world, shown.goals[world].astype(float)))
 
 
-def forces(runner: "Runner", world: int, *, particles: bool = False) -> list[Arrow]:
+def forces(engine: World, world: int, *, particles: bool = False) -> list[Arrow]:
     """The contact forces of one world: of each two solids the sum, or of each of their points.
 
     An arrow starts where a force acts and points as it acts on the first of the two solids: on a
     body rather than a tool, on a tool rather than the ground.
     """
-    contacts = runner.world.contacts(world)
+    contacts = engine.contacts(world)
     pair, point, force = contacts.pair, contacts.point, contacts.force
     first, last = pair.min(axis=1, initial=10**6), pair.max(axis=1, initial=0)
     force = np.where((pair[:, 0] > pair[:, 1])[:, None], -force, force)
@@ -133,9 +147,9 @@ def forces(runner: "Runner", world: int, *, particles: bool = False) -> list[Arr
     return arrows
 
 
-def _particles(runner: "Runner", solid: int, shape: object) -> Particles | None:
+def _particles(engine: World, solid: int, shape: object) -> Particles | None:
     """What a solid touches with; None if that is nothing, or the shape itself."""
-    positions, radius = runner.world.samples(solid)
+    positions, radius = engine.samples(solid)
     return None if isinstance(shape, Sphere) or not len(positions) else Particles(positions, radius)
 
 

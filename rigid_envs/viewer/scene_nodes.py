@@ -73,7 +73,7 @@ class SceneNodes:
 
     def _solids(self) -> list[Item]:
         """Every solid, with its poses in all worlds."""
-        return scene_view.items(self._runner, np.arange(self._runner.count))
+        return scene_view.items(self._runner.world, np.arange(self._runner.count))
 
     def _add_solid(self, k: int, solid: Item) -> Any:
         mesh = triangles(solid.shape)
@@ -100,7 +100,7 @@ class SceneNodes:
         segments = []
         if forces != FORCES[0]:
             for i in range(self._runner.count):
-                arrows = scene_view.forces(self._runner, i, particles=forces == FORCES[2])
+                arrows = scene_view.forces(self._runner.world, i, particles=forces == FORCES[2])
                 segments += [
                     np.stack([arrow.origin, arrow.origin + arrow.vector]) + self._offsets[i]
                     for arrow in arrows

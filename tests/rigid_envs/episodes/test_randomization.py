@@ -198,11 +198,11 @@ def test_a_picture_shows_the_size_that_was_drawn():
     runner = Runner("push", 2, randomize={"size": (1.5, 1.5)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
     world = np.array([1])
-    cube = scene_view.items(runner, world)[0]
+    cube = scene_view.items(runner.world, world)[0]
     np.testing.assert_allclose(cube.size * np.array(cube.shape.half_extents), 0.03)
     runner = Runner("stack", 2, randomize={"size": (0.8, 1.2)})
     runner.reset(np.ones(2, dtype=bool), np.arange(2))
-    cubes = scene_view.items(runner, world)[:2]
+    cubes = scene_view.items(runner.world, world)[:2]
     ghosts = runner.task.markers(runner.world, 1, runner.goals[1])
     for cube, ghost in zip(cubes, ghosts, strict=True):
         np.testing.assert_allclose(ghost.half_extents, cube.size * cube.shape.half_extents)

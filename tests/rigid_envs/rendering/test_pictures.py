@@ -286,7 +286,8 @@ def test_the_ghost_of_a_cube_is_green_where_the_cube_counts():
 def test_people_see_through_what_nothing_touches_and_policies_see_what_they_know():
     runner = make("RigidEnvs/Stack-v0")._runner
     seen, observed = (
-        scene_view.items(runner, np.zeros(1, dtype=int), observed=flag) for flag in (False, True)
+        scene_view.items(runner.world, np.zeros(1, dtype=int), observed=flag)
+        for flag in (False, True)
     )
     assert {item.opacity for item in observed} == {1.0}
     assert [item.color for item in observed[:2]] == list(OBSERVED_COLORS[:2])
@@ -349,9 +350,9 @@ def test_a_cross_shows_where_the_ball_landed_and_stays_there():
 def test_a_gripper_hangs_from_an_arm_that_follows_its_fingers():
     env = make("RigidEnvs/Stack-v0")
     env.reset(seed=0)
-    before = [item.position[0] for item in scene_view.items(env._runner, np.zeros(1, int))]
+    before = [item.position[0] for item in scene_view.items(env._runner.world, np.zeros(1, int))]
     env.step(np.array([0.0, 0.0, 1.0, 1.0]))
-    after = [item.position[0] for item in scene_view.items(env._runner, np.zeros(1, int))]
+    after = [item.position[0] for item in scene_view.items(env._runner.world, np.zeros(1, int))]
     assert len(after) == 2 + 2 + 4  # cubes, pads, and two fingers, a bar and a post
     rise = np.array(after)[2:, 2] - np.array(before)[2:, 2]
     assert rise.min() > 0.01
@@ -363,12 +364,12 @@ def test_forces_of_two_solids_are_summed_and_act_on_the_body():
     env.reset(seed=0)
     for _ in range(5):
         env.step(np.zeros(3))
-    (weight,) = scene_view.forces(env._runner, 0)
+    (weight,) = scene_view.forces(env._runner.world, 0)
     np.testing.assert_allclose(
         weight.vector, (0, 0, 0.1 * 9.81 * scene_view.FORCE_SCALE), atol=1e-4
     )
     np.testing.assert_allclose(weight.origin[:2], env._runner.world.position[0, 0, :2], atol=1e-4)
-    points = scene_view.forces(env._runner, 0, particles=True)
+    points = scene_view.forces(env._runner.world, 0, particles=True)
     assert len(points) > 1
     total = np.sum([arrow.vector for arrow in points], axis=0)
     np.testing.assert_allclose(total, weight.vector, atol=1e-12)

@@ -154,7 +154,7 @@ def test_a_picture_shows_bar_and_stem_where_they_are():
     env.reset(seed=0)
     yaw, place = 0.7, np.array([0.05, -0.03, T.height])
     env._runner.world.set_state(position=place, orientation=from_yaw(yaw))
-    block, *others = scene_view.items(env._runner, np.zeros(1, int))
+    block, *others = scene_view.items(env._runner.world, np.zeros(1, int))
     along = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     bar = Item(Box(BAR), place + 0.01 * along, from_yaw(yaw), block.color)
     stem = Item(Box(STEM), place - 0.02 * along, from_yaw(yaw), block.color)
@@ -171,7 +171,7 @@ def test_a_picture_shows_bar_and_stem_where_they_are():
 def test_a_picture_of_particles_shows_each_sample_once():
     env = make(block="t", render_mode="rgb_array", show_particles=True)
     env.reset(seed=0)
-    block, *_ = scene_view.items(env._runner, np.zeros(1, int), particles=True)
+    block, *_ = scene_view.items(env._runner.world, np.zeros(1, int), particles=True)
     samples, radius = env._runner.world.samples(0)
     np.testing.assert_array_equal(block.particles.positions, samples)
     np.testing.assert_array_equal(block.particles.radius, radius)
