@@ -1,7 +1,7 @@
 """A rigid-body engine on numba. It simulates thousands of worlds at once on CPU threads."""
 
-from physics.analysis.diagnostics import Contacts
 from physics.errors import ContactOverflow, SimulationDiverged, StepVanished
+from physics.model.contacts import Contacts
 from physics.model.features import Features
 from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder

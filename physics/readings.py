@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from physics.analysis import energies, field_limits, joints, readouts
-from physics.analysis.diagnostics import Contacts
 from physics.analysis.failures import failure
 from physics.analysis.lane_queries import LaneQueries
 from physics.analysis.solids import Solids
 from physics.granular.queries import GranularQueries
 from physics.manybody.queries import CrowdQueries
+from physics.model.contacts import Contacts
 from physics.model.features import Features
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
@@ -205,9 +205,6 @@ class Readings:
         overlap has stored nothing.
 
         Springs of friction are not counted: while a contact slides, their force has no potential.
-
-        Raises:
-            ValueError: a world of many bodies.
         """
         self._refresh()
         return self._queries.elastic_energy()

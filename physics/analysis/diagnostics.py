@@ -1,7 +1,7 @@
 """Contacts of a world: what touches what, where and how hard; computed by the step's kernels."""
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from physics.collision.compound_frames import make_compound_frames
 from physics.compiler.bundles import bundle
 from physics.compiler.jit import LANES, factory, large_entry
 from physics.impulse.contact_rows import make_contact_rows
-from physics.model.contacts import Contacts
+from physics.model.contacts import ContactTable
 from physics.model.features import Features
 from physics.model.lanes import load, make_constants
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, QUERY, State
@@ -22,26 +22,6 @@ from physics.spring.contact_loop import REPORT
 from physics.spring.contacts import make_half_pair
 
 Array = np.ndarray
-
-
-class Report(NamedTuple):
-    """Touching candidates of one world, in the world frame.
-
-    Attributes:
-        half_pair: [n] of the model.
-        penetration: [n] m.
-        point: [n, 3] m.
-        normal: [n, 3].
-        force: [n, 3] N on the owner of the half-pair.
-        weight: [n] of the sample.
-    """
-
-    half_pair: Array
-    penetration: Array
-    point: Array
-    normal: Array
-    force: Array
-    weight: Array
 
 
 @factory
@@ -110,44 +90,63 @@ def _rows_of_group(model: Model, features: Features, state: State, group: int) -
     return rows
 
 
-def _touching(model: Model, state: State, world: int, rows: Array) -> tuple[Array, Array]:
-    """Half-pair [n] and slot [n] of what touches in a world."""
-    half_pair = np.repeat(np.arange(len(model.half_pair)), model.half_pair["slot_count"])
-    place = np.arange(len(half_pair)) - model.half_pair["first_slot"][half_pair]
-    group, lane = divmod(state.place[world], LANES)
-    touching = rows["penetration"][:, lane] > 0.0
+def table(model: Model, features: Features, state: State, worlds: Array) -> ContactTable:
+    """What touches in the worlds [n] of these indices, at least one."""
+    if not state.candidate.shape[1]:  # nothing can touch
+        return ContactTable.empty()
+    groups = state.place[worlds] // LANES
+    found = [
+        _of_group(model, features, state, int(group), worlds[groups == group])
+        for group in np.unique(groups)
+    ]
+    return ContactTable.join(found)
+
+
+def _of_group(
+    model: Model, features: Features, state: State, group: int, worlds: Array
+) -> ContactTable:
+    """What touches in worlds [n] of one lane group."""
+    rows, lanes = _rows_of_group(model, features, state, group), state.place[worlds] % LANES
+    own = model.dynamic.ndim > 1  # whether worlds have parameters of their own
+    models = [model.of_world(int(world)) for world in (worlds if own else worlds[:1])]
+    half_pairs = models[0].half_pair
+    half_pair = np.repeat(np.arange(len(half_pairs)), half_pairs["slot_count"])
+    place = np.arange(len(half_pair)) - half_pairs["first_slot"][half_pair]
+    touching = rows["penetration"][:, lanes] > 0.0
     if "impact_force" in (state.candidate.dtype.names or ()):
         # an impact may come up to half a step before the solids touch
-        touching |= state.candidate["impact_force"][group, :, :, lane].any(axis=-1)
-    touching &= rows["weight"][:, lane] > 0.0  # 0 where another part of a compound hides a face
-    touching &= place < state.half_pair["count"][world, half_pair]
-    touching &= state.world["diverged"][world] == 0
-    return half_pair[touching], np.flatnonzero(touching)
+        touching |= state.candidate["impact_force"][group][:, :, lanes].any(axis=1)
+    touching &= rows["weight"][:, lanes] > 0.0  # 0 where another part of a compound hides a face
+    touching &= place[:, None] < state.half_pair["count"][worlds][:, half_pair].T
+    touching &= state.world["diverged"][worlds] == 0
+    of, slot = np.nonzero(touching.T)
+    lane, half_pair = lanes[of], half_pair[slot]
 
-
-def report(model: Model, features: Features, state: State, world: int) -> Report:
-    """What touches in a world."""
-    group, lane = divmod(int(state.place[world]), LANES)
-    rows = _rows_of_group(model, features, state, group)
-    model = model.of_world(world)
-    half_pair, slot = _touching(model, state, world, rows)
-
-    statics, dynamic = model.static, state.dynamic[world]
-    centers = np.concatenate([dynamic["position"], statics[:, :3]])
-    turns = rotation_matrix(np.concatenate([dynamic["orientation"], statics[:, 3:]]))
+    dynamic, static, part = state.dynamic[worlds], models[0].static, models[0].compound_part
+    ends = np.stack([half_pairs["owner"], half_pairs["surface"]], axis=-1)[half_pair]
+    frame = half_pairs["frame"][half_pair]
+    everywhere = (len(worlds), len(static))
+    centers = np.concatenate(
+        [dynamic["position"], np.broadcast_to(static[:, :3], (*everywhere, 3))], axis=1
+    )
+    turns = np.concatenate(
+        [dynamic["orientation"], np.broadcast_to(static[:, 3:], (*everywhere, 4))], axis=1
+    )
+    turns = rotation_matrix(turns)
     # compound parts have frames too
-    at, place = model.compound_part["solid"], model.compound_part["position"]
-    centers = np.concatenate([centers, centers[at] + np.einsum("nij,nj->ni", turns[at], place)])
-    turns = np.concatenate([turns, turns[at] @ model.compound_part["rotation"].reshape(-1, 3, 3)])
-    surface, frame = model.half_pair["surface"][half_pair], model.half_pair["frame"][half_pair]
-    plane = model.half_pair["kind"][half_pair] == PLANE
+    at, places = part["solid"], np.stack([m.compound_part["position"] for m in models])
+    centers = np.concatenate(
+        [centers, centers[:, at] + np.einsum("wnij,wnj->wni", turns[:, at], places)], axis=1
+    )
+    turns = np.concatenate([turns, turns[:, at] @ part["rotation"].reshape(-1, 3, 3)], axis=1)
+    plane = half_pairs["kind"][half_pair] == PLANE
     in_world_frame = features.impulse | plane[:, None]
-    origin = centers[model.half_pair["owner"][half_pair]] if features.impulse else centers[frame]
+    origin = centers[of, ends[:, 0]] if features.impulse else centers[of, frame]
     if not features.impulse:
         origin = np.where(in_world_frame, 0.0, origin)
 
     def rotated(vectors: Array, by: Array) -> Array:
-        return np.einsum("nij,nj->ni", turns[by], vectors)
+        return np.einsum("nij,nj->ni", turns[of, by], vectors)
 
     def in_world(name: str) -> Array:
         vectors = rows[name][slot, :, lane]
@@ -155,38 +154,32 @@ def report(model: Model, features: Features, state: State, world: int) -> Report
 
     force = in_world("force")
     if features.impulse:
-        force = force + rotated(state.candidate["impact_force"][group, slot, :, lane], surface)
-    return Report(
-        half_pair=half_pair,
-        penetration=rows["penetration"][slot, lane],
+        force = force + rotated(state.candidate["impact_force"][group, slot, :, lane], ends[:, 1])
+    stiffness = np.stack([m.half_pair["stiffness"] for m in models])
+    kinds, kind = np.unique(half_pair, return_inverse=True)
+    return ContactTable(
+        world=worlds[of],
+        pair=ends,
         point=in_world("point") + origin,
         normal=in_world("normal"),
+        penetration=rows["penetration"][slot, lane],
         force=force,
+        first_touch=_first_touches(state, half_pairs)[half_pair, worlds[of]],
         weight=rows["weight"][slot, lane],
+        stiffness=stiffness[of % len(models), half_pair],
+        kind=kind,
+        coefficients=list(half_pairs[kinds]),
     )
 
 
-def contacts(
-    model: Model, features: Features, state: State, world: int, names: tuple[str, ...]
-) -> Contacts:
-    """The touching points of one world, whose solids have these names."""
-    found = report(model, features, state, world)
-    model = model.of_world(world)
-    half_pair = model.half_pair[found.half_pair]
-    pair = np.stack([half_pair["owner"], half_pair["surface"]], axis=-1)
-    first = {
-        ends: first_touch(state, np.flatnonzero(between(model, *ends)))[world]
-        for ends in set(map(tuple, pair))
-    }
-    return Contacts(
-        pair=pair,
-        names=tuple((names[first], names[second]) for first, second in pair),
-        point=found.point,
-        normal=found.normal,
-        penetration=found.penetration,
-        force=found.force,
-        first_touch=np.array([first[ends] for ends in map(tuple, pair)]),
-    )
+def _first_touches(state: State, half_pairs: Array) -> Array:
+    """[half-pairs, worlds] s, when the two solids of each half-pair first touched."""
+    ends = np.sort(np.stack([half_pairs["owner"], half_pairs["surface"]], axis=-1), axis=-1)
+    _, pair = np.unique(ends, axis=0, return_inverse=True)
+    touches = state.touch[:, FIRST_TOUCH, : len(state.world)]
+    first = np.full((pair.max(initial=-1) + 1, touches.shape[1]), np.nan)
+    np.fmin.at(first, pair.ravel(), touches)
+    return first[pair.ravel()]
 
 
 def first_touch(state: State, half_pairs: Array) -> Array:
@@ -238,16 +231,3 @@ def samples(model: Model, solid: int) -> tuple[Array, float | Array]:
             return points[0].copy(), float(radii[0])
         return np.concatenate(points), np.repeat(radii, rows[count])
     return np.zeros((0, 3)), 0.0
-
-
-def penetration(model: Model, features: Features, state: State) -> Array:
-    """Deepest penetration of each world now, [w] m, 0 where nothing touches."""
-    deepest = np.zeros(len(state.world))
-    half_pairs = model.of_world(0)
-    for group in range(len(state.candidate)):
-        rows = _rows_of_group(model, features, state, group)
-        for lane, world in enumerate(state.resident[group * LANES : (group + 1) * LANES]):
-            if world >= 0:
-                slot = _touching(half_pairs, state, world, rows)[1]
-                deepest[world] = rows["penetration"][slot, lane].max(initial=0.0)
-    return deepest

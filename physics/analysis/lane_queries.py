@@ -2,37 +2,26 @@
 
 import numpy as np
 
-from physics.analysis import diagnostics, stability
-from physics.analysis.contact_energy import elastic_energy
-from physics.analysis.diagnostics import Contacts
+from physics.analysis import diagnostics
+from physics.analysis.contact_queries import ContactQueries
+from physics.model.contacts import ContactTable
 from physics.step.simulation import Simulation
 
 Array = np.ndarray
 
 
-class LaneQueries:
+class LaneQueries(ContactQueries):
     """Contacts of worlds side by side, with states that are up to date."""
 
     def __init__(self, simulation: Simulation) -> None:
         """`simulation`: of the worlds."""
-        self._simulation = simulation
+        super().__init__(simulation)
         self._between: dict[tuple[int, int], Array] = {}
 
-    def penetration(self) -> Array:
-        """[count] m, deepest penetration now; 0 where nothing touches."""
+    def table(self, worlds: Array) -> ContactTable:
+        """What touches in the worlds [n] of these indices."""
         simulation = self._simulation
-        return diagnostics.penetration(simulation.model, simulation.features, simulation.state)
-
-    def elastic_energy(self) -> Array:
-        """[count] J stored in the springs of contacts now."""
-        return elastic_energy(self._simulation)
-
-    def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
-        """The touching points of one world, whose solids have these names."""
-        simulation = self._simulation
-        return diagnostics.contacts(
-            simulation.model, simulation.features, simulation.state, world, names
-        )
+        return diagnostics.table(simulation.model, simulation.features, simulation.state, worlds)
 
     def samples(self, solid: int) -> tuple[Array, float | Array]:
         """Points with which a solid touches others, see `World.samples`."""
@@ -62,8 +51,3 @@ class LaneQueries:
         """[count, 3] m, position of the first of two solids then."""
         half_pairs = self._half_pairs(first, second)
         return diagnostics.first_touch_position(self._simulation.state, half_pairs)
-
-    def largest_stable_step(self, world: int) -> float:
-        """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
-        simulation = self._simulation
-        return stability.of_contacts(simulation.model, simulation.features, simulation.state, world)

@@ -22,11 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from physics.analysis.contact_stiffness import inverse_masses, unit_stiffness
 from physics.model.features import Features
 from physics.model.normal_damping import REST_DAMPING
 from physics.model.rocking import face_contacts, largest_eigenvalue
-from physics.model.state import State
 from physics.model.tables import Model
 from physics.scene.drives import Drive
 from physics.scene.scene import Scene
@@ -116,29 +114,6 @@ def root(load: Callable[[float], float]) -> float:
             values[1 - end] *= 0.5
         moved = end
     return math.exp(ends[0])
-
-
-def of_contacts(model: Model, features: Features, state: State, world: int) -> float:
-    """Largest stable step in s of a world with its present contacts; inf if nothing limits it."""
-    contacts = {} if features.impulse else unit_stiffness(model, features, state, world)
-    model = model.of_world(world)
-    inverse = inverse_masses(model, state, world)
-
-    def load(h: float) -> float:
-        A = np.zeros_like(inverse)
-        for k, (along, across, turn, parts, grip) in contacts.items():
-            half_pair = model.half_pair[k]
-            A += normal_load(half_pair, features.dashpot, h, parts) * along
-            A += (
-                shear_load(half_pair, features.viscous, h, grip) * across
-                + twist_load(half_pair, h, grip) * turn
-            )
-        for i, dynamic in enumerate(model.dynamic):
-            block = slice(6 * i, 6 * i + 3)
-            A[block, block] += servo_load(dynamic, h) * np.eye(3)
-        return float(largest_eigenvalue(inverse, A))
-
-    return root(load)
 
 
 def of_servo(dynamic: Any) -> float:

@@ -1,41 +1,59 @@
 """What can be asked of heaps of particle bodies about their contacts."""
 
-import math
-
 import numpy as np
 
-from physics.analysis.contact_system import ContactSystem
+from physics.analysis.contact_queries import ContactQueries
 from physics.granular.simulation import GranularSimulation
-from physics.model.contacts import Contacts
+from physics.model.contacts import ContactTable
 
 Array = np.ndarray
 
 
-class GranularQueries:
+class GranularQueries(ContactQueries):
     """Contacts of heaps of particle bodies, with states that are up to date."""
 
-    def __init__(self, simulation: GranularSimulation) -> None:
-        """`simulation`: of the worlds."""
-        self._simulation = simulation
+    _simulation: GranularSimulation
 
-    def penetration(self) -> Array:
-        """[count] m, deepest penetration now; 0 where nothing touches."""
-        return self._simulation.penetration()
+    def table(self, worlds: Array) -> ContactTable:
+        """What touches in the worlds [n] of these indices.
 
-    def elastic_energy(self) -> Array:
-        """Not computed here.
-
-        Raises:
-            ValueError: always.
+        The body with the smaller index is the first of a pair, whatever the order in the heap.
         """
-        raise ValueError(
-            "elastic_energy is computed in worlds side by side only, got a world of "
-            f"{self._simulation.bodies} bodies"
+        touching = [self._simulation.touching(int(world)) for world in worlds]
+        found = np.concatenate(touching)
+        classes = self._simulation.classes()
+        ends = np.stack([found["owner"], found["other"]], axis=-1)
+        turned = ends[:, 0] > ends[:, 1]
+        kinds = np.concatenate([classes[ends], turned[:, None]], axis=1)
+        _, example, kind = np.unique(kinds, axis=0, return_index=True, return_inverse=True)
+        rows = [self._coefficients(*ends[n].tolist()) for n in example]
+        weight, stiffness = (
+            np.array([row[name] for row in rows])[kind.ravel()] for name in ("weight", "stiffness")
+        )
+        sign = np.where(turned, -1.0, 1.0)[:, None]
+        return ContactTable(
+            world=np.repeat(worlds, [len(rows) for rows in touching]),
+            pair=np.sort(ends, axis=1),
+            point=found["point"],
+            normal=sign * found["normal"],
+            penetration=found["penetration"],
+            force=sign * found["force"],
+            first_touch=np.full(len(found), np.nan),  # not recorded
+            weight=weight,
+            stiffness=stiffness,
+            kind=kind.ravel(),
+            coefficients=rows,
         )
 
-    def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
-        """The touching points of one world, whose solids have these names."""
-        return self._simulation.contacts(world)
+    def _coefficients(self, owner: int, other: int) -> dict[str, float]:
+        """Of the contacts of a body with another solid, by the names of HALF_PAIR."""
+        row = self._simulation.coefficients(owner, other)
+        loads = row["owner_shear_load"], row["surface_shear_load"]
+        first, second = loads if owner < other else loads[::-1]
+        return {
+            **row, "owner_shear_load": first, "surface_shear_load": second,
+            "pair_mass": 1.0 / row["inverse_mass"], "rolling": 0.0, "spinning": 0.0,
+        }  # fmt: skip
 
     def samples(self, solid: int) -> tuple[Array, float | Array]:
         """The balls of a body, see `World.samples`; none of a static."""
@@ -49,13 +67,10 @@ class GranularQueries:
 
     def normal_force(self, first: int, second: int) -> Array:
         """[count] N between two solids now."""
-        forces = []
-        for world in range(self._simulation.count):
-            found = self._simulation.contacts(world)
-            ends = np.sort(found.pair, axis=1)
-            between = (ends == sorted((first, second))).all(axis=1)
-            forces.append(np.sum(found.force * found.normal, axis=1)[between].sum())
-        return np.array(forces)
+        found = self._all()
+        between = (found.pair == sorted((first, second))).all(axis=1)
+        along = between * np.sum(found.force * found.normal, axis=1)
+        return np.bincount(found.world, along, self._simulation.count)
 
     def first_touch(self, first: int, second: int) -> Array:
         """Not recorded here.
@@ -78,21 +93,3 @@ class GranularQueries:
             f"{name} is not recorded in a heap of {self._simulation.bodies} bodies of particles; "
             "World.contacts has the points of all contacts"
         )
-
-    def largest_stable_step(self, world: int) -> float:
-        """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
-        simulation, found = self._simulation, self._simulation.contacts(world)
-        if not len(found.pair):
-            return math.inf
-        classes = simulation.classes()[found.pair]
-        _, example, kind = np.unique(classes, axis=0, return_index=True, return_inverse=True)
-        rows = []
-        for n in example.tolist():
-            row = simulation.coefficients(int(found.pair[n, 0]), int(found.pair[n, 1]))
-            rows.append({**row, "pair_mass": 1.0 / row["inverse_mass"]})
-        weights = np.array([row["weight"] for row in rows])[kind.ravel()]
-        return ContactSystem(
-            simulation.state.dynamic[world], simulation.base.dynamic, found.pair, found.point,
-            found.normal, weights, [{**row, "rolling": 0.0, "spinning": 0.0} for row in rows],
-            kind.ravel(), True, simulation.fidelity.friction == "viscous",
-        ).largest_stable_step()  # fmt: skip

@@ -31,7 +31,6 @@ from physics.granular.tables import (
     HeapFeatures,
     Scratch,
 )
-from physics.model.contacts import Contacts
 from physics.model.features import cached_by_features
 
 Array = np.ndarray
@@ -149,15 +148,10 @@ def make_report(features: HeapFeatures) -> Any:
     return report
 
 
-def contacts(
-    heap: Heap,
-    constants: Constants,
-    scratch: Scratch,
-    features: HeapFeatures,
-    states: Array,
-    names: tuple[str, ...],
-) -> Contacts:
-    """The touching points of a heap whose list is valid.
+def touching_rows(
+    heap: Heap, constants: Constants, scratch: Scratch, features: HeapFeatures, states: Array
+) -> Array:
+    """Rows [n] of ROW of a heap whose list is valid, with indices of solids.
 
     Args:
         heap: of the world.
@@ -165,7 +159,6 @@ def contacts(
         scratch: working memory.
         features: of the kernels.
         states: [bodies] of DYNAMIC_STATE.
-        names: of the scene's solids.
     """
     current, walls = heap.counts[PARITY] % len(heap.pair), heap.counts[PARITY] % len(heap.wall)
     room = heap.pair_count[current].sum() + heap.wall_count[walls].sum()
@@ -173,17 +166,6 @@ def contacts(
     rows = rows[: make_report(features)(heap, constants, scratch, states, rows)]
     bodies = len(heap.order)
     solid_of = np.concatenate([heap.order, np.arange(bodies, bodies + len(constants.static))])
-    pair = np.stack([solid_of[rows["owner"]], solid_of[rows["other"]]], axis=-1)
-    # as other reports: the body with the smaller index is the first
-    turned = pair[:, 0] > pair[:, 1]
-    pair[turned] = pair[turned, ::-1]
-    sign = np.where(turned, -1.0, 1.0)[:, None]
-    return Contacts(
-        pair=pair,
-        names=tuple((names[first], names[second]) for first, second in pair),
-        point=rows["point"].copy(),
-        normal=sign * rows["normal"],
-        penetration=rows["penetration"].copy(),
-        force=sign * rows["force"],
-        first_touch=np.full(len(pair), np.nan),  # not recorded
-    )
+    for end in ("owner", "other"):
+        rows[end] = solid_of[rows[end]]
+    return rows

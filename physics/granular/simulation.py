@@ -16,7 +16,7 @@ from physics.granular.packing import (
     with_room_for_pairs,
     with_room_for_walls,
 )
-from physics.granular.reports import contacts
+from physics.granular.reports import touching_rows
 from physics.granular.support import supports
 from physics.granular.tables import (
     DIVERGED,
@@ -34,7 +34,6 @@ from physics.granular.tables import (
     Scratch,
 )
 from physics.model.build import build
-from physics.model.contacts import Contacts
 from physics.model.features import GENERAL, ISOTROPIC, Features
 from physics.model.free_memory import check_memory
 from physics.model.state import DYNAMIC_STATE, STARTS_ANEW, State
@@ -322,18 +321,13 @@ class GranularSimulation(Simulation):
             "weight": float(own.weight[first]),
         }
 
-    def contacts(self, world: int) -> Contacts:
-        """The touching points of one world now."""
+    def touching(self, world: int) -> Array:
+        """Rows of `reports.ROW` of what touches in one world now."""
         self.refresh()
-        return contacts(
+        return touching_rows(
             self.heaps[world], self._constants, self._scratch, self.heap_features,
-            self.state.dynamic[world], self.scene.solid_names,
+            self.state.dynamic[world],
         )  # fmt: skip
-
-    def penetration(self) -> Array:
-        """[count] m, deepest penetration of each world now, 0 where nothing touches."""
-        depths = [self.contacts(w).penetration for w in range(self.count)]
-        return np.array([depth.max(initial=0.0) for depth in depths])
 
     def classes(self) -> Array:
         """[solids] a number for each: equal ones have the same coefficients with any other."""

@@ -5,23 +5,26 @@ from typing import Any
 
 import numpy as np
 
-from physics.analysis.contact_system import ContactSystem
-from physics.analysis.diagnostics import Contacts, samples
+from physics.analysis.contact_queries import ContactQueries
+from physics.analysis.diagnostics import samples
 from physics.compiler.jit import LANES, aligned_zeros
 from physics.manybody.reports import TOUCH, ReportArrays, make_touching
 from physics.manybody.simulation import CrowdSimulation
+from physics.model.contacts import ContactTable
 from physics.model.impulse_rows import CONTACT_ROW
 from physics.spring.contact_loop import REPORT
 
 Array = np.ndarray
 
 
-class CrowdQueries:
+# columns of TOUCH that a table of contacts has too
+_SAME = ("point", "normal", "penetration", "force", "first_touch", "weight")
+
+
+class CrowdQueries(ContactQueries):
     """Contacts of worlds of many bodies, with states that are up to date."""
 
-    def __init__(self, simulation: CrowdSimulation) -> None:
-        """`simulation`: of the worlds."""
-        self._simulation = simulation
+    _simulation: CrowdSimulation
 
     def _solid(self, places: Array) -> Array:
         """Indices of solids: bodies, drives, then statics."""
@@ -52,37 +55,19 @@ class CrowdQueries:
                 return arrays.found[:count]
             arrays = arrays._replace(found=np.zeros(count, TOUCH))
 
-    def penetration(self) -> Array:
-        """[count] m, deepest penetration now; 0 where nothing touches."""
-        deepest = [
-            self._touching(world)["penetration"].max(initial=0.0)
-            for world in range(self._simulation.count)
-        ]
-        return np.array(deepest)
-
-    def elastic_energy(self) -> Array:
-        """Not computed here.
-
-        Raises:
-            ValueError: always.
-        """
-        raise ValueError(
-            "elastic_energy is computed in worlds side by side only, got a world of "
-            f"{self._simulation.bodies} bodies"
-        )
-
-    def contacts(self, world: int, names: tuple[str, ...]) -> Contacts:
-        """The touching points of one world, whose solids have these names."""
-        found = self._touching(world)
-        pair = np.stack([self._solid(found["owner"]), self._solid(found["surface"])], axis=-1)
-        return Contacts(
-            pair=pair,
-            names=tuple((names[first], names[second]) for first, second in pair),
-            point=found["point"].copy(),
-            normal=found["normal"].copy(),
-            penetration=found["penetration"].copy(),
-            force=found["force"].copy(),
-            first_touch=found["first_touch"].copy(),
+    def table(self, worlds: Array) -> ContactTable:
+        """What touches in the worlds [n] of these indices."""
+        touching = [self._touching(int(world)) for world in worlds]
+        found = np.concatenate(touching)
+        kinds, kind = np.unique(found["half_pair"], return_inverse=True)
+        rows = self._simulation.kinds.model.half_pair
+        return ContactTable(
+            world=np.repeat(worlds, [len(rows) for rows in touching]),
+            pair=self._solid(np.stack([found["owner"], found["surface"]], axis=-1)),
+            **{name: found[name] for name in _SAME},
+            stiffness=rows["stiffness"][found["half_pair"]],
+            kind=kind,
+            coefficients=list(rows[kinds]),
         )
 
     def samples(self, solid: int) -> tuple[Array, float | Array]:
@@ -154,17 +139,3 @@ class CrowdQueries:
         """Whether two solids are of kinds that can touch."""
         kinds = self._simulation.kinds
         return first != second and kinds.pair[kinds.of_solid[first], kinds.of_solid[second]] >= 0
-
-    def largest_stable_step(self, world: int) -> float:
-        """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
-        simulation = self._simulation
-        found = self._touching(world)
-        if simulation.features.impulse:  # contacts limit nothing, servos do
-            found = found[:0]
-        kinds, kind = np.unique(found["half_pair"], return_inverse=True)
-        rows, ends = simulation.kinds.model.half_pair[kinds], [found["owner"], found["surface"]]
-        return ContactSystem(
-            simulation.state.dynamic[world], simulation.base.dynamic,
-            self._solid(np.stack(ends, axis=-1)), found["point"], found["normal"], found["weight"],
-            list(rows), kind, simulation.features.dashpot, simulation.features.viscous,
-        ).largest_stable_step()  # fmt: skip

@@ -1,6 +1,7 @@
-"""Contacts: what is reported of the touching points of one world."""
+"""Contacts: what is reported of touching points."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,3 +29,50 @@ class Contacts(NamedTuple):
     penetration: Array
     force: Array
     first_touch: Array
+
+
+class ContactTable(NamedTuple):
+    """Touching points of some worlds, n of them, in the world frame: what all readings come from.
+
+    Attributes:
+        world: [n] index.
+        pair: [n, 2] indices of the two solids.
+        point: [n, 3] m.
+        normal: [n, 3] from the second solid to the first.
+        penetration: [n] m.
+        force: [n, 3] N on the first solid.
+        first_touch: [n] s.
+        weight: [n] part of the coefficients that belongs to the point.
+        stiffness: [n] N/m, of the whole contact along the normal.
+        kind: [n] row of `coefficients`.
+        coefficients: of each kind of contact, by the names of HALF_PAIR; those of the first of the
+            worlds, if their parameters differ.
+    """
+
+    world: Array
+    pair: Array
+    point: Array
+    normal: Array
+    penetration: Array
+    force: Array
+    first_touch: Array
+    weight: Array
+    stiffness: Array
+    kind: Array
+    coefficients: Sequence[Any]
+
+    @classmethod
+    def empty(cls) -> "ContactTable":
+        """Nothing touches."""
+        none, vectors, indices = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=int)
+        pair = np.zeros((0, 2), dtype=int)
+        return cls(indices, pair, vectors, vectors, none, vectors, none, none, none, indices, ())
+
+    @classmethod
+    def join(cls, tables: Sequence["ContactTable"]) -> "ContactTable":
+        """One table of several worlds' tables, at least one, with the same coefficients."""
+        columns = cls._fields[:-1]
+        joined: dict[str, Any] = {
+            name: np.concatenate([getattr(t, name) for t in tables]) for name in columns
+        }
+        return tables[0]._replace(**joined)

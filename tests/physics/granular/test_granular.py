@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from physics.analysis.lane_queries import LaneQueries
+from physics.granular.queries import GranularQueries
 from physics.granular.simulation import GranularSimulation
 from physics.granular.tables import SHEAR_LOAD
 from physics.model import free_memory
@@ -73,6 +75,10 @@ def digest(sim):
     return hashlib.sha256(sim.state.dynamic.tobytes()).hexdigest()
 
 
+def found_in(sim):
+    return GranularQueries(sim).table(np.array([0]))
+
+
 def kinetic_energy(sim):
     rows, omega = sim.state.dynamic[0], sim.angular_velocity()[0]
     linear = np.sum(rows["momentum"] ** 2 * sim.of_bodies("inverse_mass")[:, None])
@@ -99,6 +105,9 @@ def test_bodies_move_as_in_the_dense_engine(friction, stress):
                 ours, theirs = heap.state.dynamic[name], dense.state.dynamic[name]
                 assert np.abs(ours - theirs).max() < 1e-8 * scale, mixed
         assert forces > 1.0  # they have touched
+        stored = LaneQueries(dense).elastic_energy()
+        assert stored[0] > 1e-6
+        assert GranularQueries(heap).elastic_energy() == pytest.approx(stored, rel=1e-6)
 
 
 @pytest.mark.parametrize("friction", ["viscous", "coulomb"])
@@ -107,7 +116,7 @@ def test_results_do_not_depend_on_the_threads(friction):
     for heap in heaps:
         advance(heap, 400)
     assert len({digest(heap) for heap in heaps}) == 1
-    assert heaps[0].penetration()[0] > 0.0
+    assert found_in(heaps[0]).penetration.max() > 0.0
 
 
 def test_friction_forgets_how_many_contacts_bodies_had():
@@ -124,7 +133,7 @@ def test_the_refreshed_forces_and_a_report_agree():
     advance(heap, 400)
     heap.forget(heap.everyone)
     assert heap.refresh()
-    found, bodies = heap.contacts(0), heap.bodies
+    found, bodies = found_in(heap), heap.bodies
     total = heap.of_bodies("weight").copy()
     np.add.at(total, found.pair[:, 0], found.force)
     inner = found.pair[:, 1] < bodies
@@ -165,7 +174,7 @@ def test_no_contact_is_lost(seed):
         i, j = np.nonzero(np.triu(apart < size[:, None] + size, 1))
         expected = sorted((owner[a], owner[b]) for a, b in zip(i, j, strict=True)
                           if owner[a] != owner[b])  # fmt: skip
-        assert sorted(map(tuple, heap.contacts(0).pair.tolist())) == expected
+        assert sorted(map(tuple, found_in(heap).pair.tolist())) == expected
 
 
 def test_no_contact_is_lost_on_the_way():
@@ -175,7 +184,7 @@ def test_no_contact_is_lost_on_the_way():
         advance(heap, 50)
         fresh.state.dynamic[:] = heap.state.dynamic
         fresh.forget(fresh.everyone)
-        pairs = [sorted(map(tuple, one.contacts(0).pair.tolist())) for one in (heap, fresh)]
+        pairs = [sorted(map(tuple, found_in(one).pair.tolist())) for one in (heap, fresh)]
         assert pairs[0] == pairs[1]
     assert len(pairs[0]) > 100
 
@@ -217,7 +226,7 @@ def test_a_heap_settles_and_never_gains_energy(friction):
     # the load of the whole heap on one contact sinks by W/k; the pair mass of equal bodies is m/2
     mass = 1.0 / heap.of_bodies("inverse_mass")[0]
     k = 0.5 * mass * (heap.fidelity.contact_resolution / STEP) ** 2
-    assert heap.penetration()[0] < heap.bodies * mass * 9.81 / k
+    assert found_in(heap).penetration.max() < heap.bodies * mass * 9.81 / k
 
 
 def test_a_copy_continues_bitwise_equal():

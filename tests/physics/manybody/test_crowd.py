@@ -207,13 +207,16 @@ def test_a_wrench_lifts_one_cube():
     assert np.abs(np.delete(risen, 30)).max() < 2e-3
 
 
-def test_the_largest_stable_step_is_that_of_all_pairs():
+def test_the_largest_stable_step_and_elastic_energy_are_those_of_all_pairs():
     world = World(heap(34), "balanced")
     all_pairs = Simulation(heap(34), world.fidelity, 1, 1, False, kernel="general")
     world.advance(0.1)
     all_pairs.advance(0.1, all_pairs.everyone)
-    expected = LaneQueries(all_pairs).largest_stable_step(0)
-    assert world.largest_stable_step() == pytest.approx(expected, rel=3e-3)
+    expected = LaneQueries(all_pairs)
+    assert world.largest_stable_step() == pytest.approx(expected.largest_stable_step(0), rel=3e-3)
+    stored = expected.elastic_energy()
+    assert stored[0] > 1e-6
+    assert world.elastic_energy() == pytest.approx(stored, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", ["balanced", "solid"])

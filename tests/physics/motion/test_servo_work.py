@@ -141,8 +141,6 @@ def test_what_cannot_be_measured_is_an_error():
     )
     with pytest.raises(ValueError, match="measure_work must be False in a world of many bodies"):
         World(many, measure_work=True)
-    with pytest.raises(ValueError, match="elastic_energy is computed in worlds side by side"):
-        World(many).elastic_energy()
     saved = World(LIFT).snapshot()
     with pytest.raises(ValueError, match="another measure_work: False"):
         World(LIFT, measure_work=True).restore(saved)
