@@ -22,12 +22,14 @@ class Snapshot(NamedTuple):
 
     Attributes:
         features: of the kernel that advanced them: what it remembers of contacts depends on it.
+        engine: that simulates them, see `physics.engines`.
     """
 
     scene: Scene
     fidelity: Fidelity
     state: State
     features: Features
+    engine: str
     parameters: Parameters | None = None  # of worlds with per-world parameters
     hidden: Any = None  # of worlds of many bodies: their pairs
     memory: Mapping[str, Array] = MappingProxyType({})  # see `World.memory`
@@ -39,7 +41,7 @@ def save(simulation: Simulation) -> Snapshot:
     parameters = own.pick(everyone) if simulation.features.per_world_parameters else None  # a copy
     return Snapshot(
         simulation.scene, simulation.fidelity, copy(simulation.state), simulation.features,
-        parameters, simulation.saved(),
+        simulation.engine, parameters, simulation.saved(),
     )  # fmt: skip
 
 
@@ -85,6 +87,8 @@ def _difference(simulation: Simulation, saved: Snapshot) -> str:
     count = len(saved.state.world)
     if count != simulation.count:
         return f"count: {count} instead of {simulation.count}"
+    if saved.engine != simulation.engine:
+        return f"engine: {saved.engine!r} instead of {simulation.engine!r}"
     if saved.fidelity != simulation.fidelity:
         ours = vars(simulation.fidelity)
         fields = [f"{k}={v!r}" for k, v in vars(saved.fidelity).items() if v != ours[k]]

@@ -16,12 +16,12 @@ from physics.analysis.solids import Solids
 from physics.analysis.solver_limits import check_solver
 from physics.analysis.step_limits import check_step
 from physics.analysis.work_limits import check_work
+from physics.engines import choose_engine
 from physics.granular.queries import GranularQueries
 from physics.granular.simulation import GranularSimulation
-from physics.granular.support import supports
 from physics.manybody.limits import check_crowd, check_impacts
 from physics.manybody.queries import CrowdQueries
-from physics.manybody.simulation import CrowdSimulation, is_crowd
+from physics.manybody.simulation import CrowdSimulation
 from physics.motion.drive_commands import make_move_command, make_velocity_command, worlds_last
 from physics.readings import Readings
 from physics.scene.fidelity import Fidelity, resolve
@@ -57,6 +57,11 @@ class World(Readings):
             with contacts, have special kernels only. "auto": what has been compiled before, special
             before general; if neither has, general below 256 worlds. None: what the environment
             variable RIGID_ENVS_KERNEL says, else "auto". `World.kernel` tells what was chosen.
+        engine: "worlds", "bodies" or "particles", see `physics.engines`; "auto": what suits the
+            scene. `World.engine` tells what was chosen.
+
+    Attributes:
+        engine: see above.
 
     Raises:
         TypeError: an argument of the wrong type.
@@ -77,6 +82,7 @@ class World(Readings):
         per_world_parameters: bool = False,
         measure_work: bool = False,
         kernel: str | None = None,
+        engine: str = "auto",
     ) -> None:
         """Builds the model and puts every world into the scene's state."""
         self.scene: Scene = instance("scene", scene, Scene)
@@ -88,16 +94,16 @@ class World(Readings):
         self._allow_unstable: bool = instance("allow_unstable", allow_unstable, bool)
         kernel = requested(kernel)
         arguments = scene, self.fidelity, self.count, self.threads, per_world_parameters
-        crowd = is_crowd(scene, self.fidelity, per_world_parameters)
-        check_solver(scene, self.fidelity, crowd)
+        self.engine = choose_engine(scene, self.fidelity, engine, per_world_parameters)
+        check_solver(scene, self.fidelity, self.engine)
         if measure_work:
-            check_work(scene, self.fidelity, crowd)
-        if crowd and not supports(scene, self.fidelity):
+            check_work(scene, self.fidelity, self.engine)
+        if self.engine == "particles":
             heap = GranularSimulation(*arguments[:-1])
             self._simulation, self._queries = heap, GranularQueries(heap)
             if not allow_unstable:
                 check_crowd(scene, self.fidelity, heap.classes())
-        elif crowd:
+        elif self.engine == "bodies":
             many = CrowdSimulation(*arguments, kernel=kernel)
             self._simulation, self._queries = many, CrowdQueries(many)
             check_integrator(scene, self.fidelity, many.base)
@@ -122,7 +128,7 @@ class World(Readings):
         return (
             f"World({len(self.scene.bodies)} bodies, {len(self.scene.drives)} drives, "
             f"{len(self.scene.statics)} statics, fidelity={self.fidelity}, count={self.count}, "
-            f"kernel={self.kernel!r})"
+            f"engine={self.engine!r}, kernel={self.kernel!r})"
         )
 
     # --- time ---------------------------------------------------------------------------------
@@ -332,10 +338,10 @@ class World(Readings):
                 is unstable, a body sinks, or one is too light for what presses it. The message
                 names the solid and the largest safe substep or the least mass.
         """
-        if not isinstance(self._queries, LaneQueries):
+        if self.engine != "worlds":
             raise ValueError(
-                f"check_parameters is for worlds side by side; a world of {len(self.scene.bodies)} "
-                "bodies has no per-world parameters: build one with per_world_parameters=True"
+                f"check_parameters needs engine='worlds', got {self.engine!r} for "
+                f"{len(self.scene.bodies)} bodies: build a World with per_world_parameters=True"
             )
         low, high = check_ranges(ranges, Parameters.of(self.scene))
         if not self._allow_unstable:

@@ -72,7 +72,7 @@ def _better(scene: Scene, fidelity: Fidelity, depth: float) -> str:
         return f"materials {depth / DEEP:.2g} times as stiff"
     shorter = f"substep={fidelity.substep * math.sqrt(DEEP / depth):.2g}"
     try:
-        check_solver(scene, NEWTON, False)
+        check_solver(scene, NEWTON, "worlds")
     except ValueError:
         return shorter
     solves = "law='impulse' with solver='newton' and contact_resolution=50"

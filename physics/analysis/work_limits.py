@@ -6,17 +6,16 @@ from physics.scene.scene import Scene
 INTEGRATORS = ("midpoint", "euler")
 
 
-def check_work(scene: Scene, fidelity: Fidelity, crowd: bool) -> None:
+def check_work(scene: Scene, fidelity: Fidelity, engine: str) -> None:
     """Raises ValueError if the work of servos is not measured in worlds of a scene.
 
-    `crowd`: whether they are worlds of many bodies.
+    `engine`: see `physics.engines`.
     """
     if not scene.drives:
         raise ValueError("measure_work needs a Drive or Gripper in Scene.drives, got none")
-    if crowd:
+    if engine != "worlds":
         raise ValueError(
-            "measure_work must be False in a world of many bodies, got True with "
-            f"{len(scene.bodies)} bodies; it is measured in worlds side by side"
+            f"measure_work needs engine='worlds', got {engine!r} for {len(scene.bodies)} bodies"
         )
     if fidelity.time_control != "fixed":
         raise ValueError(

@@ -1,7 +1,7 @@
 """GranularSimulation: heaps of particle bodies, with the methods of `physics.step.simulation`."""
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -71,6 +71,8 @@ class GranularSimulation(Simulation):
     Raises:
         ValueError: the scene or the fidelity is not supported, see `supports`.
     """
+
+    engine: ClassVar[str] = "particles"
 
     def __init__(self, scene: Scene, fidelity: Fidelity, count: int, threads: int) -> None:
         """Builds the model and puts every world into the scene's state."""

@@ -1,6 +1,6 @@
 """Simulation of worlds of many bodies: pairs of bodies side by side in vector lanes, not worlds."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,9 +24,7 @@ from physics.model.state import STARTS_ANEW
 from physics.model.tables import DYNAMIC_PER_WORLD, Model
 from physics.model.workspace import GIVEN, JOINT_WORK, NORMAL_SUMS, SOLID, START, Workspace
 from physics.rotation import rotation_matrix
-from physics.scene.fidelity import Fidelity
 from physics.scene.parameters import Parameters
-from physics.scene.scene import Scene
 from physics.scene.solids import Ground
 from physics.scene.validation import IDENTITY
 from physics.step.readout import make_readout
@@ -35,17 +33,8 @@ from physics.step.threads import run_together
 
 Array = np.ndarray
 
-# bodies from which a scene's pairs are found by a grid; below, all pairs have rows of their own
-MANY = 33
 # batches of pairs for which a second thread pays
 _FEWEST_BATCHES = 32
-
-
-def is_crowd(scene: Scene, fidelity: Fidelity, per_world_parameters: bool) -> bool:
-    """Whether a scene is simulated here: many bodies, the same in all worlds."""
-    steps = fidelity.time_control in ("fixed", "swept")
-    steps = steps and fidelity.integrator in ("midpoint", "euler")
-    return len(scene.bodies) >= MANY and steps and not per_world_parameters
 
 
 class CrowdSimulation(Simulation):
@@ -56,6 +45,7 @@ class CrowdSimulation(Simulation):
         mechanisms: what couples bodies otherwise than by contact.
     """
 
+    engine: ClassVar[str] = "bodies"
     kinds: Kinds
     mechanisms: Mechanisms
 

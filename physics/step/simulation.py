@@ -1,7 +1,7 @@
 """Simulation: the arrays of many worlds, and the kernels that advance them."""
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -52,11 +52,14 @@ class Simulation:
         base: the model of the scene itself.
         model: the model that the kernels read, with rows for each lane group if
             `per_world_parameters`.
+        engine: see `physics.engines`.
         needed: the features that the scene needs.
         features: what is compiled in, which may be more.
         parameters: [count, bodies] of the bodies; of identical worlds [1, bodies].
         state: what changes.
     """
+
+    engine: ClassVar[str] = "worlds"
 
     def __init__(
         self,

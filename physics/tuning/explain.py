@@ -13,6 +13,7 @@ from physics.analysis.field_limits import longest_step
 from physics.analysis.sinks import rest_depth
 from physics.analysis.soft_supports import SoftSupport
 from physics.analysis.step_limits import largest_safe_step
+from physics.engines import choose_engine
 from physics.manybody.limits import neighbourhoods
 from physics.model.build import build
 from physics.model.features import GENERAL, ISOTROPIC, Features, general
@@ -64,7 +65,8 @@ def explain(scene: Scene, fidelity: str | Fidelity = "balanced", *, costs: bool 
     scene, fidelity = instance("scene", scene, Scene), resolve(fidelity)
     few = _kinds(scene)
     model, features = build(few, fidelity)
-    lines = [code(fidelity), f"kernel: {_kernel(features)}", "", "Models"]
+    lines = [code(fidelity), f"engine: {choose_engine(scene, fidelity)}"]
+    lines += [f"kernel: {_kernel(features)}", "", "Models"]
     lines += [f"  {line}" for line in _modelled(scene, fidelity, features)]
     lines += ["", "Leaves out"]
     lines += [f"  {line}" for line in _left_out(scene, fidelity, features)] or ["  nothing"]

@@ -11,8 +11,8 @@ import numpy as np
 
 from physics.analysis.soft_supports import SoftSupport
 from physics.compiler.jit import LANES
+from physics.engines import MANY
 from physics.errors import SimulationDiverged
-from physics.manybody.simulation import MANY
 from physics.scene.fidelity import Fidelity
 from physics.scene.scene import Scene
 from physics.step.kernel_choice import load_kernels, requested

@@ -12,7 +12,7 @@ import numpy as np
 from physics.analysis.solver_limits import check_solver
 from physics.analysis.standing import base, pull, tipping
 from physics.analysis.step_limits import given_stiffness
-from physics.manybody.simulation import is_crowd
+from physics.engines import choose_engine
 from physics.model.rocking import outward_sides
 from physics.model.tables import Model
 from physics.rotation import rotate_back
@@ -102,7 +102,7 @@ def _better(scene: Scene, fidelity: Fidelity, loss: float) -> str:
     if fidelity.solver == "newton":
         return shorter
     try:
-        check_solver(scene, NEWTON, is_crowd(scene, NEWTON, False))
+        check_solver(scene, NEWTON, choose_engine(scene, NEWTON))
     except ValueError:
         return shorter
     return f"{shorter}, or {code(NEWTON)}"

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from physics.manybody.simulation import MANY
+from physics.engines import MANY
 from physics.scene.fidelity import LAWS, Fidelity
 from physics.scene.scene import Scene
 from physics.scene.validation import choice, instance, integer, positive

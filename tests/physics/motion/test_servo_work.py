@@ -139,7 +139,7 @@ def test_what_cannot_be_measured_is_an_error():
         [Body(Sphere(0.01), mass=0.1, position=(0.1 * i, 0, 1)) for i in range(40)],
         drives=LIFT.drives,
     )
-    with pytest.raises(ValueError, match="measure_work must be False in a world of many bodies"):
+    with pytest.raises(ValueError, match="measure_work needs engine='worlds', got 'bodies' for 40"):
         World(many, measure_work=True)
     saved = World(LIFT).snapshot()
     with pytest.raises(ValueError, match="another measure_work: False"):
