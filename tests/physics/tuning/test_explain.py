@@ -43,7 +43,8 @@ def test_the_sink_at_rest_is_the_one_that_a_world_has():
 
 def test_it_says_which_kernels_there_are():
     lines = explain(CUBE, Fidelity(), costs=False).splitlines()
-    assert lines[1].startswith(
+    assert lines[1] == "engine: worlds"
+    assert lines[2].startswith(
         "kernel: compiled for this scene, or a general one, which also has: slope, lever"
     )
     ball = Body(Sphere(0.02), mass=0.1, material=Material(rolling_resistance=1e-3))
