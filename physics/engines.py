@@ -32,7 +32,7 @@ def choose_engine(
     if per_world_parameters:
         bodies = particles = "per_world_parameters must be False, got True"
     else:
-        bodies, particles = _of_bodies(fidelity), supports(scene, fidelity)
+        bodies, particles = _of_bodies(scene, fidelity), supports(scene, fidelity)
     if engine == "auto":
         return "worlds" if bodies else "bodies" if particles else "particles"
     reason = bodies if engine == "bodies" else particles
@@ -41,8 +41,10 @@ def choose_engine(
     return engine
 
 
-def _of_bodies(fidelity: Fidelity) -> str:
-    """Why "bodies" can't simulate at a fidelity; "" if it can."""
+def _of_bodies(scene: Scene, fidelity: Fidelity) -> str:
+    """Why "bodies" can't simulate a scene at a fidelity; "" if it can."""
+    if not scene.bodies:
+        return "Scene.bodies must hold at least one body, got none"
     for name, right in _OF_BODIES:
         value = getattr(fidelity, name)
         if value not in right:

@@ -96,11 +96,12 @@ class ContactQueries(ABC):
     def largest_stable_step(self, world: int) -> float:
         """Largest stable step in s with a world's present contacts; inf if nothing limits it."""
         simulation = self._simulation
-        found, features = self.table(np.array([world])), simulation.needed
-        if features.impulse:  # contacts limit nothing, servos do
-            found = found._replace(**{k: getattr(found, k)[:0] for k in found._fields[:-1]})
+        features = simulation.needed
+        # with impulses contacts limit nothing, servos do
+        found = ContactTable.empty() if features.impulse else self.table(np.array([world]))
+        kinds, kind = np.unique(found.kind, return_inverse=True)
         return ContactSystem(
             simulation.state.dynamic[world], simulation.model.of_world(world).dynamic, found.pair,
-            found.point, found.normal, found.weight, found.coefficients, found.kind,
+            found.point, found.normal, found.weight, [found.coefficients[n] for n in kinds], kind,
             features.dashpot, features.viscous,
         ).largest_stable_step()  # fmt: skip

@@ -1,7 +1,8 @@
 """The largest stable step of a world with many contacts, without writing its matrices down.
 
-The load of a step on the velocities, A in `analysis.stability`, is a sum over contacts. A power
-iteration needs its product with a vector only, so time and memory grow with the contacts.
+The load of a step on the velocities, A in `analysis.stability`, is a sum over contacts. Lanczos'
+method needs its product with a vector only, so time and memory grow with the contacts. M^-1 A is
+symmetric in the product x M y.
 """
 
 import math
@@ -16,9 +17,10 @@ from physics.rotation import rotation_matrix
 
 Array = np.ndarray
 
-# steps of the power iteration for the largest frequency, and the change at which it ends
-_MOST_ITERATIONS = 200
-_CONVERGED = 1e-3
+# most products with a vector for the largest eigenvalue, and the residual at which they end, as a
+# part of the eigenvalue, whose own error is of the order of its square
+_MOST_PRODUCTS = 200
+_CONVERGED = 1e-4
 
 
 class ContactSystem:
@@ -73,28 +75,42 @@ class ContactSystem:
         servos = self._constants["servo_stiffness"] + self._constants["servo_damping"]
         if not len(self._kind) and not np.any(servos):
             return math.inf
-        x = np.random.default_rng(0).normal(size=(self._count, 6))
 
         def load(h: float) -> float:
-            nonlocal x  # a good start for the next step
-            size, loads = 0.0, self._loads(h)
             servo = np.array([stability.servo_load(row, h) for row in self._constants])
-            for _ in range(_MOST_ITERATIONS):
-                x = x / np.sqrt(self._product(x, x))
-                y = self._accelerate(loads, servo, x)
-                new = self._product(x, y)
-                x = y
-                if abs(new - size) <= _CONVERGED * new:
-                    break
-                size = new
-            return new
+            return self._largest_eigenvalue(self._loads(h), servo)
 
         return stability.root(load)
 
-    def _product(self, x: Array, y: Array) -> float:
-        """The product x M y with the mass matrix M."""
-        moved = np.sum(x[:, :3] * y[:, :3] / self._inverse_mass)
-        return float(moved + np.einsum("bi,bij,bj->", x[:, 3:], self._inertia, y[:, 3:]))
+    def _largest_eigenvalue(self, loads: tuple[Array, Array, Array], servo: Array) -> float:
+        """Of M^-1 A, by Lanczos' method from a random start, with full orthogonalisation."""
+        x = np.random.default_rng(0).normal(size=(self._count, 6))
+        x[:, 3:] *= np.any(self._constants["inverse_inertia"] > 0.0, axis=1)[:, None]
+        x /= math.sqrt(np.sum(x * self._momentum(x)))
+        vectors, momenta = np.zeros((2, 0, x.size))
+        T = np.zeros((_MOST_PRODUCTS + 1, _MOST_PRODUCTS + 1))
+        largest = 0.0
+        for n in range(min(_MOST_PRODUCTS, x.size)):
+            vectors = np.vstack([vectors, x.reshape(1, -1)])
+            momenta = np.vstack([momenta, self._momentum(x).reshape(1, -1)])
+            y: Any = self._accelerate(loads, servo, x).ravel()
+            T[n, n] = momenta[n] @ y
+            for _ in range(2):  # once more for what round-off has left
+                y -= vectors.T @ (momenta @ y)
+            y = y.reshape(x.shape)
+            left = math.sqrt(max(np.sum(y * self._momentum(y)), 0.0))
+            values, parts = np.linalg.eigh(T[: n + 1, : n + 1])
+            largest = float(values[-1])
+            if left * abs(parts[-1, -1]) <= _CONVERGED * largest:
+                break
+            T[n, n + 1] = T[n + 1, n] = left
+            x = y / left
+        return largest
+
+    def _momentum(self, x: Array) -> Array:
+        """M x, of a velocity [bodies, 6]."""
+        turning = np.einsum("bij,bj->bi", self._inertia, x[:, 3:])
+        return np.concatenate([x[:, :3] / self._inverse_mass, turning], axis=1)
 
     def _loads(self, h: float) -> tuple[Array, Array, Array]:
         """Of each contact, along the normal and across it in kg, and against rotation in kg m^2."""

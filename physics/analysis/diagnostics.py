@@ -14,171 +14,174 @@ from physics.model.features import Features
 from physics.model.lanes import load, make_constants
 from physics.model.state import FIRST_POSITION, FIRST_TOUCH, NORMAL_FORCE, QUERY, State
 from physics.model.tables import Model
-from physics.model.workspace import Workspace
 from physics.motion.kinematics import make_kinematics, write_drive_frames, write_static_frames
 from physics.rotation import rotation_matrix
 from physics.scene.shapes import PLANE
 from physics.spring.contact_loop import REPORT
 from physics.spring.contacts import make_half_pair
+from physics.step.simulation import Simulation
+from physics.step.threads import run_in_blocks
 
 Array = np.ndarray
 
 
 @factory
 def _make_report(features: Features) -> Any:
-    """Entry point: evaluates every candidate of a lane group at its present state."""
+    """Entry point: evaluates every candidate of some lane groups at their present states."""
     constants, kinematics = make_constants(features), make_kinematics(features)
     compound_frames = make_compound_frames(features)
     impulse = features.impulse
     half_pair = make_contact_rows(features) if impulse else make_half_pair(features, True)
 
     @large_entry
-    def report(group, state, workspace, chosen, rows):
+    def report(all_model, state, workspace, chosen, groups, rows, first, last):
+        """Writes rows [groups, slots] of REPORT, for groups first <= n < last."""
         state, workspace = bundle(state), bundle(workspace)
-        model = bundle(constants(group, 0))
-        write_static_frames(model, workspace)
-        load(model, state, workspace, chosen, 0)
-        write_drive_frames(model, workspace)
-        kinematics(model, workspace)
-        compound_frames(model, workspace)
-        for k in range(model.half_pair.shape[0]):
-            if workspace.half_pair[k].slots > 0:
-                if impulse:
-                    # the impulse of one second is the force
-                    half_pair(model, state, workspace, 0, k, workspace.lane[0].updates_memory, 1.0)
-                else:
-                    half_pair(model, state, workspace, rows, 0, k, 0.0, QUERY)
+        for n in range(first, last):
+            g, found = groups[n], rows[n]
+            model = bundle(constants(all_model, g))
+            if load(model, state, workspace, chosen, g) == 0:
+                continue
+            write_static_frames(model, workspace)
+            write_drive_frames(model, workspace)
+            kinematics(model, workspace)
+            compound_frames(model, workspace)
+            lane = workspace.lane[0]
+            for i in range(LANES):
+                lane.updates_memory[i] = 0
+            for k in range(model.half_pair.shape[0]):
+                live, slot = workspace.half_pair[k], model.half_pair[k].first_slot
+                if live.slots == 0:
+                    continue
+                # what contacts remember stays: with springs the step of 0 s restores it
+                if not impulse:
+                    half_pair(model, state, workspace, found, g, k, 0.0, QUERY)
+                    continue
+                # the impulse of one second is the force
+                half_pair(model, state, workspace, g, k, lane.updates_memory, 1.0)
+                for s in range(slot, slot + live.slots):
+                    point, row = workspace.contact_row[s], found[s]
+                    for i in range(LANES):
+                        row.penetration[i], row.weight[i] = -point.separation[i], point.weight[i]
+                        for c in range(3):
+                            row.point[c, i], row.normal[c, i] = point.arm[c, i], point.normal[c, i]
+                            row.force[c, i] = (
+                                point.normal_impulse[i] * point.normal[c, i]
+                                + point.tangential_impulse[c, i]
+                            )
+        return 0
 
     return report
 
 
-def _rows_of_group(model: Model, features: Features, state: State, group: int) -> Array:
-    """[slots] of REPORT: every slot of a lane group.
-
-    Vectors are in the frame of the half-pair's surface. With the impulse law they are in the world
-    frame, and points are relative to the owner.
-    """
-    places = slice(group * LANES, (group + 1) * LANES)
-    lanes = np.flatnonzero(state.resident[places] >= 0)
-    worlds, resident = state.resident[places][lanes], np.full(LANES, -1)
-    resident[lanes] = np.arange(len(lanes))
-    alone = slice(group, group + 1)
-    copied = State(
-        dynamic=state.dynamic[worlds],  # a copy, as all of these
-        half_pair=state.half_pair[worlds],
-        touch=state.touch[..., worlds].copy(),  # worlds come last in memory
-        world=state.world[worlds],
-        sample_id=state.sample_id[alone].copy(),
-        candidate=state.candidate[alone].copy(),  # their memory must not change
-        wrench=state.wrench[worlds] if state.wrench.size else state.wrench,
-        motor=state.motor[worlds],
-        pace=state.pace[worlds] if state.pace.size else state.pace,
-        place=lanes,
-        resident=resident,
-        servo=state.servo[worlds] if state.servo.size else state.servo,
-    )
-    rows = np.zeros(state.candidate.shape[1], REPORT)
-    everyone = np.ones(len(copied.world), dtype=bool)
-    workspace = Workspace.of(model.of_world(0), features)
-    _make_report(features)(model.of_group(group), copied, workspace, everyone, rows)
-    if features.impulse:
-        points = workspace.contact_row
-        rows["penetration"], rows["weight"] = -points["separation"], points["weight"]
-        rows["point"], rows["normal"] = points["arm"], points["normal"]
-        normal_impulses = points["normal_impulse"][:, None] * points["normal"]
-        rows["force"] = points["tangential_impulse"] + normal_impulses
-    return rows
-
-
-def table(model: Model, features: Features, state: State, worlds: Array) -> ContactTable:
-    """What touches in the worlds [n] of these indices, at least one."""
+def table(simulation: Simulation, worlds: Array) -> ContactTable:
+    """What touches in the worlds [n] of these indices."""
+    state, features, model = simulation.state, simulation.features, simulation.model
     if not state.candidate.shape[1]:  # nothing can touch
         return ContactTable.empty()
-    groups = state.place[worlds] // LANES
-    found = [
-        _of_group(model, features, state, int(group), worlds[groups == group])
-        for group in np.unique(groups)
-    ]
-    return ContactTable.join(found)
-
-
-def _of_group(
-    model: Model, features: Features, state: State, group: int, worlds: Array
-) -> ContactTable:
-    """What touches in worlds [n] of one lane group."""
-    rows, lanes = _rows_of_group(model, features, state, group), state.place[worlds] % LANES
-    own = model.dynamic.ndim > 1  # whether worlds have parameters of their own
-    models = [model.of_world(int(world)) for world in (worlds if own else worlds[:1])]
-    half_pairs = models[0].half_pair
+    groups, group = np.unique(state.place[worlds] // LANES, return_inverse=True)
+    rows, lane = _rows(simulation, worlds, groups), state.place[worlds] % LANES
+    one = model.of_world(0)
+    half_pairs = one.half_pair
     half_pair = np.repeat(np.arange(len(half_pairs)), half_pairs["slot_count"])
     place = np.arange(len(half_pair)) - half_pairs["first_slot"][half_pair]
-    touching = rows["penetration"][:, lanes] > 0.0
-    if "impact_force" in (state.candidate.dtype.names or ()):
+    touching = rows["penetration"][group, :, lane] > 0.0  # [worlds, slots], as below
+    if features.impulse:
         # an impact may come up to half a step before the solids touch
-        touching |= state.candidate["impact_force"][group][:, :, lanes].any(axis=1)
-    touching &= rows["weight"][:, lanes] > 0.0  # 0 where another part of a compound hides a face
-    touching &= place[:, None] < state.half_pair["count"][worlds][:, half_pair].T
-    touching &= state.world["diverged"][worlds] == 0
-    of, slot = np.nonzero(touching.T)
-    lane, half_pair = lanes[of], half_pair[slot]
+        impact_force = state.candidate["impact_force"][groups]
+        touching |= impact_force[group, :, :, lane].any(axis=-1)
+    touching &= rows["weight"][group, :, lane] > 0.0  # 0: another part of a compound hides a face
+    touching &= place < state.half_pair["count"][worlds][:, half_pair]
+    touching &= (state.world["diverged"][worlds] == 0)[:, None]
+    of, slot = np.nonzero(touching)
+    group, lane, world, half_pair = group[of], lane[of], worlds[of], half_pair[slot]
 
-    dynamic, static, part = state.dynamic[worlds], models[0].static, models[0].compound_part
-    ends = np.stack([half_pairs["owner"], half_pairs["surface"]], axis=-1)[half_pair]
-    frame = half_pairs["frame"][half_pair]
-    everywhere = (len(worlds), len(static))
-    centers = np.concatenate(
-        [dynamic["position"], np.broadcast_to(static[:, :3], (*everywhere, 3))], axis=1
-    )
-    turns = np.concatenate(
-        [dynamic["orientation"], np.broadcast_to(static[:, 3:], (*everywhere, 4))], axis=1
-    )
-    turns = rotation_matrix(turns)
-    # compound parts have frames too
-    at, places = part["solid"], np.stack([m.compound_part["position"] for m in models])
-    centers = np.concatenate(
-        [centers, centers[:, at] + np.einsum("wnij,wnj->wni", turns[:, at], places)], axis=1
-    )
-    turns = np.concatenate([turns, turns[:, at] @ part["rotation"].reshape(-1, 3, 3)], axis=1)
-    plane = half_pairs["kind"][half_pair] == PLANE
-    in_world_frame = features.impulse | plane[:, None]
-    origin = centers[of, ends[:, 0]] if features.impulse else centers[of, frame]
-    if not features.impulse:
-        origin = np.where(in_world_frame, 0.0, origin)
+    ends = np.stack([half_pairs["owner"], half_pairs["surface"]], axis=-1)
+    pair, frame = ends[half_pair], half_pairs["frame"][half_pair]
+    centers, turns = _frames(model, one, state, worlds)
+    in_world_frame = features.impulse | (half_pairs["kind"][half_pair] == PLANE)[:, None]
 
     def rotated(vectors: Array, by: Array) -> Array:
         return np.einsum("nij,nj->ni", turns[of, by], vectors)
 
     def in_world(name: str) -> Array:
-        vectors = rows[name][slot, :, lane]
+        vectors = rows[name][group, slot, :, lane]
         return np.where(in_world_frame, vectors, rotated(vectors, frame))
 
-    force = in_world("force")
-    if features.impulse:
-        force = force + rotated(state.candidate["impact_force"][group, slot, :, lane], ends[:, 1])
-    stiffness = np.stack([m.half_pair["stiffness"] for m in models])
-    kinds, kind = np.unique(half_pair, return_inverse=True)
+    force, origin = in_world("force"), np.where(in_world_frame, 0.0, centers[of, frame])
+    if features.impulse:  # points are relative to the owner
+        origin = centers[of, pair[:, 0]]
+        force = force + rotated(impact_force[group, slot, :, lane], pair[:, 1])
     return ContactTable(
-        world=worlds[of],
-        pair=ends,
+        world=world,
+        pair=pair,
         point=in_world("point") + origin,
         normal=in_world("normal"),
-        penetration=rows["penetration"][slot, lane],
+        penetration=rows["penetration"][group, slot, lane],
         force=force,
-        first_touch=_first_touches(state, half_pairs)[half_pair, worlds[of]],
-        weight=rows["weight"][slot, lane],
-        stiffness=stiffness[of % len(models), half_pair],
-        kind=kind,
-        coefficients=list(half_pairs[kinds]),
+        first_touch=_first_touches(state, ends, worlds)[half_pair, of],
+        weight=rows["weight"][group, slot, lane],
+        stiffness=_of_worlds(model.half_pair, "stiffness", world, half_pair),
+        kind=half_pair,
+        coefficients=model.of_world(int(worlds[0])).half_pair,
     )
 
 
-def _first_touches(state: State, half_pairs: Array) -> Array:
-    """[half-pairs, worlds] s, when the two solids of each half-pair first touched."""
-    ends = np.sort(np.stack([half_pairs["owner"], half_pairs["surface"]], axis=-1), axis=-1)
-    _, pair = np.unique(ends, axis=0, return_inverse=True)
-    touches = state.touch[:, FIRST_TOUCH, : len(state.world)]
-    first = np.full((pair.max(initial=-1) + 1, touches.shape[1]), np.nan)
-    np.fmin.at(first, pair.ravel(), touches)
+def _rows(simulation: Simulation, worlds: Array, groups: Array) -> Array:
+    """[groups, slots] of REPORT: every slot of lane groups, of the worlds [n].
+
+    Vectors are in the frame of the half-pair's surface. With the impulse law they are in the world
+    frame, and points are relative to the owner.
+    """
+    model, state = simulation.model, simulation.state
+    rows = np.zeros((len(groups), state.candidate.shape[1]), REPORT)
+    chosen = np.zeros(simulation.count, dtype=bool)
+    chosen[worlds] = True
+    kernel = _make_report(simulation.features)
+
+    def run(first: int, last: int) -> int:
+        workspace = simulation.take_workspace()
+        kernel(model, state, workspace, chosen, groups, rows, first, last)
+        simulation.return_workspace(workspace)
+        return 0
+
+    run_in_blocks(run, len(groups), simulation.threads)
+    return rows
+
+
+def _frames(model: Model, one: Model, state: State, worlds: Array) -> tuple[Array, Array]:
+    """Centres [n, frames, 3] m and rotations [n, frames, 3, 3] of solids and of compound parts.
+
+    `one`: the model of one world.
+    """
+    dynamic, static = state.dynamic[worlds], one.static
+    statics = np.broadcast_to(static, (len(worlds), *static.shape))
+    centers = np.concatenate([dynamic["position"], statics[..., :3]], axis=1)
+    turns = rotation_matrix(np.concatenate([dynamic["orientation"], statics[..., 3:]], axis=1))
+    parts, at = one.compound_part, one.compound_part["solid"]
+    every = np.broadcast_to(np.arange(len(parts)), (len(worlds), len(parts)))
+    places = _of_worlds(model.compound_part, "position", worlds[:, None], every)
+    places = centers[:, at] + np.einsum("wnij,wnj->wni", turns[:, at], places)
+    own = turns[:, at] @ parts["rotation"].reshape(-1, 3, 3)
+    return np.concatenate([centers, places], axis=1), np.concatenate([turns, own], axis=1)
+
+
+def _of_worlds(table: Array, name: str, world: Array, row: Array) -> Array:
+    """A field of rows of a model's table, each in a world, if the field differs between worlds."""
+    if table.ndim == 1:
+        return np.asarray(table[name][row])
+    group, lane = np.divmod(world, LANES)
+    return np.asarray(np.moveaxis(table[name], -1, 1)[group, lane, row])
+
+
+def _first_touches(state: State, ends: Array, worlds: Array) -> Array:
+    """[half-pairs, n] s, when the two solids of each half-pair first touched.
+
+    `ends`: [half-pairs, 2] their solids.
+    """
+    _, pair = np.unique(np.sort(ends, axis=-1), axis=0, return_inverse=True)
+    first = np.full((pair.max() + 1, len(worlds)), np.nan)
+    np.fmin.at(first, pair.ravel(), state.touch[:, FIRST_TOUCH][:, worlds])
     return first[pair.ravel()]
 
 

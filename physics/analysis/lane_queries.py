@@ -20,8 +20,7 @@ class LaneQueries(ContactQueries):
 
     def table(self, worlds: Array) -> ContactTable:
         """What touches in the worlds [n] of these indices."""
-        simulation = self._simulation
-        return diagnostics.table(simulation.model, simulation.features, simulation.state, worlds)
+        return diagnostics.table(self._simulation, worlds)
 
     def samples(self, solid: int) -> tuple[Array, float | Array]:
         """Points with which a solid touches others, see `World.samples`."""

@@ -59,15 +59,14 @@ class CrowdQueries(ContactQueries):
         """What touches in the worlds [n] of these indices."""
         touching = [self._touching(int(world)) for world in worlds]
         found = np.concatenate(touching)
-        kinds, kind = np.unique(found["half_pair"], return_inverse=True)
         rows = self._simulation.kinds.model.half_pair
         return ContactTable(
             world=np.repeat(worlds, [len(rows) for rows in touching]),
             pair=self._solid(np.stack([found["owner"], found["surface"]], axis=-1)),
             **{name: found[name] for name in _SAME},
             stiffness=rows["stiffness"][found["half_pair"]],
-            kind=kind,
-            coefficients=list(rows[kinds]),
+            kind=found["half_pair"],
+            coefficients=rows,
         )
 
     def samples(self, solid: int) -> tuple[Array, float | Array]:

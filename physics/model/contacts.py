@@ -1,6 +1,5 @@
 """Contacts: what is reported of touching points."""
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,7 +58,7 @@ class ContactTable(NamedTuple):
     weight: Array
     stiffness: Array
     kind: Array
-    coefficients: Sequence[Any]
+    coefficients: Any
 
     @classmethod
     def empty(cls) -> "ContactTable":
@@ -67,12 +66,3 @@ class ContactTable(NamedTuple):
         none, vectors, indices = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=int)
         pair = np.zeros((0, 2), dtype=int)
         return cls(indices, pair, vectors, vectors, none, vectors, none, none, none, indices, ())
-
-    @classmethod
-    def join(cls, tables: Sequence["ContactTable"]) -> "ContactTable":
-        """One table of several worlds' tables, at least one, with the same coefficients."""
-        columns = cls._fields[:-1]
-        joined: dict[str, Any] = {
-            name: np.concatenate([getattr(t, name) for t in tables]) for name in columns
-        }
-        return tables[0]._replace(**joined)

@@ -213,7 +213,7 @@ def test_the_largest_stable_step_and_elastic_energy_are_those_of_all_pairs():
     world.advance(0.1)
     all_pairs.advance(0.1, all_pairs.everyone)
     expected = LaneQueries(all_pairs)
-    assert world.largest_stable_step() == pytest.approx(expected.largest_stable_step(0), rel=3e-3)
+    assert world.largest_stable_step() == pytest.approx(expected.largest_stable_step(0), rel=1e-5)
     stored = expected.elastic_energy()
     assert stored[0] > 1e-6
     assert world.elastic_energy() == pytest.approx(stored, rel=1e-9)
