@@ -41,6 +41,7 @@ def main() -> None:
         deceleration, damping, gliding = free.braking()
         print(f"FetchSlide's puck: deceleration {deceleration:.2f} m/s^2, damping "
               f"{damping:.2f} 1/s, gliding {gliding:.3f} m/s")  # fmt: skip
+        print(f"ends of slides are off by {1e3 * free.misses():.0f} mm in the median")
         print(f"its restitution: {identify.restitution(slides):.2f}")
         low, high = free.glides(deceleration, damping)
         print(f"nine of ten glide at {low:.3f} to {high:.3f} m/s")

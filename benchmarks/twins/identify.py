@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares, minimize
 
 from benchmarks.twins.recordings import Recording
-from benchmarks.twins.replay import replay
+from benchmarks.twins.replay import replay, speed_ratios
 from physics import Body, Material, World
 from rigid_envs.twins.fetch import hand as fetch
 from rigid_envs.twins.fetch import slide
@@ -122,13 +122,10 @@ def restitution(recording: Recording) -> float:
     In the median of the ratios of the largest speeds, at `balanced`.
     """
 
-    def fastest(path: Array) -> Array:
-        speed = np.linalg.norm(np.diff(path[..., :2], axis=0), axis=2) / FRAME
-        return np.asarray(speed.max(axis=0))
-
-    there, tried, ratios = fastest(recording.observations[..., 3:6]), np.linspace(0.0, 0.8, 9), []
-    for e in tried:
-        ratios.append(np.median(fastest(replay(recording, FetchSlideWith(e)).body) / there))
+    tried = np.linspace(0.0, 0.8, 9)
+    ratios = [
+        np.median(speed_ratios(recording, replay(recording, FetchSlideWith(e)))) for e in tried
+    ]
     return float(np.interp(1.0, ratios, tried))
 
 
@@ -181,6 +178,11 @@ class Slides(NamedTuple):
 
         found = minimize(lack, (1.0, 7.0, 0.03), method="Nelder-Mead").x
         return float(found[0]), float(found[1]), float(found[2])
+
+    def misses(self) -> float:
+        """Median distance in m of their ends from those with the braking of the twin."""
+        miss = self.miss(slide.DECELERATION, slide.DAMPING, slide.GLIDING)
+        return float(np.median(np.linalg.norm(miss, axis=1)))
 
     def glides(self, deceleration: float, damping: float) -> tuple[float, float]:
         """5 and 95 % quantiles of the speeds in m/s of gliding, one for each puck."""

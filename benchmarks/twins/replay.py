@@ -72,6 +72,15 @@ def body_errors(recording: Recording, found: Replay, first: int) -> Array:
     return np.asarray(np.linalg.norm(offset, axis=1))
 
 
+def speed_ratios(recording: Recording, found: Replay) -> Array:
+    """Largest speed [episodes] of Fetch's objects, in a step along the table, over that there."""
+    here, there = (
+        np.linalg.norm(np.diff(path[..., :2], axis=0), axis=2).max(axis=0)
+        for path in (found.body, recording.observations[..., OBJECT["fetch"] :])
+    )
+    return np.asarray(here / there)
+
+
 PRESSED = 20  # steps after which hands have moved along the table for five
 # recordings by name: the twin that plays them
 REPLAYED = {
@@ -102,6 +111,12 @@ def summary() -> list[str]:
                 found = replay(recording, TWINS[twin](), fidelity)
                 errors = body_errors(recording, found, OBJECT[name[:5]])
                 lines.append(_line(name, f"object after the last step, {fidelity}", errors))
+                if name == "fetch-slides":
+                    low, middle, high = np.quantile(speed_ratios(recording, found), (0.1, 0.5, 0.9))
+                    lines.append(
+                        f"{name:14} {f'largest speed of the puck, {fidelity}':38} median "
+                        f"{middle:.2f} of that there, 80 % {low:.2f} to {high:.2f}"
+                    )
         else:
             steps = PRESSED if name.endswith("presses") else 12
             errors = hand_errors(recording, found, steps)

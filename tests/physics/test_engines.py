@@ -42,7 +42,7 @@ def test_an_engine_that_cannot_simulate_a_scene_says_why(engine, fidelity, per_w
 
 def test_a_drive_alone_is_not_a_scene_of_bodies():
     alone = Scene([], drives=[Drive(Sphere(0.02), mass=0.1, force_limit=1.0)])
-    with pytest.raises(ValueError, match="Scene.bodies must hold at least one body, got none"):
+    with pytest.raises(ValueError, match=r"Scene\.bodies must hold at least one body, got none"):
         World(alone, engine="bodies")
 
 

@@ -10,6 +10,7 @@ import json
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -25,7 +26,7 @@ from rigid_envs.twins import TWINS
 from training.policies.policy import Policy
 from training.results.evaluate import Evaluation
 from training.settings.environments import task_of
-from training.settings.errors import UsageError
+from training.settings.errors import UsageError, nearest
 from training.settings.seed_ranges import EVALUATION
 
 Array = np.ndarray
@@ -86,15 +87,16 @@ def check_twin(policy: Policy, env_id: str) -> None:
     """Raises UsageError if a policy is none of the twin of `env_id`."""
     originals = {_name(twin.original): f"RigidEnvs/{twin.__name__}-v0" for twin in TWINS.values()}
     if _name(env_id) not in originals:
+        names = sorted(twin.original for twin in TWINS.values())
         raise UsageError(
-            f"--in is {env_id!r}, which has no twin here; there are twins of "
-            f"{', '.join(sorted(twin.original for twin in TWINS.values()))}"
+            f"--in is {env_id!r}, which has no twin here; did you mean {nearest(env_id, names)!r}? "
+            f"There are twins of {', '.join(names)}"
         )
     task = TWINS.get(task_of(policy.env_id) or "")
     if task is None or _name(task.original) != _name(env_id):
         raise UsageError(
-            f"the policy was trained on {policy.env_id}, should be one of "
-            f"{originals[_name(env_id)]} to act in {env_id}"
+            f"the policy was trained on {policy.env_id}; only one of {originals[_name(env_id)]} "
+            f"acts in {env_id}"
         )
 
 
@@ -153,6 +155,7 @@ class Originals:
         self.env_id, self.worlds = env_id, worlds
         self._shares = [len(part) for part in np.array_split(np.arange(worlds), processes)]
         self._workers: list[subprocess.Popen[str]] = []
+        self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115  (closed by `close`)
         mode = "rgb_array" if render else None
         try:
             for _ in self._shares:
@@ -169,7 +172,7 @@ class Originals:
         try:
             return subprocess.Popen(
                 [str(self.python.absolute()), str(WORKER)], stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                stdout=subprocess.PIPE, stderr=self._errors, text=True,
             )  # fmt: skip
         except OSError as error:
             raise UsageError(f"{self.python} can't run: {error.strerror}") from None
@@ -197,6 +200,7 @@ class Originals:
                 if stream is not None:
                     with suppress(BrokenPipeError):  # of what an ended worker didn't read
                         stream.close()
+        self._errors.close()
 
     def __enter__(self) -> Self:
         return self
@@ -232,7 +236,10 @@ class Originals:
         except BrokenPipeError:
             lines = [""]
         if not all(lines):
-            raise UsageError(f"{self.python} ended while it ran {self.env_id}")
+            last = self._last_error()
+            raise UsageError(
+                self._explain(last) if last else f"{self.python} ended while it ran {self.env_id}"
+            )
         try:
             replies: list[dict[str, Any]] = [json.loads(line) for line in lines]
         except json.JSONDecodeError:
@@ -243,6 +250,12 @@ class Originals:
             if "error" in reply:
                 raise UsageError(self._explain(reply["error"]))
         return replies
+
+    def _last_error(self) -> str:
+        """The last line that workers wrote to stderr."""
+        self._errors.seek(0)
+        lines = [line.strip() for line in self._errors if line.strip()]
+        return lines[-1] if lines else ""
 
     def _explain(self, error: str) -> str:
         """What went wrong in a worker, with the command that mends it."""

@@ -21,7 +21,8 @@ Array = np.ndarray
 CUBES = ("first cube", "second cube")
 PLACED = 0.04  # m, of the first cube from its goal, for the second one's turn
 JITTER = 0.03  # m, largest offset along x and y of a first cube that starts at its goal
-# m, between the middles of cubes along x or y, so that open fingers around one don't meet the other
+# m, between the middles of cubes along x or y, so that fingers around one don't meet the other:
+# more than the hand's offset, half a finger and half a cube; gap, offset, a finger and a cube
 ROOM = (0.05, 0.09)
 HEIGHTS = (HALF, 3.0 * HALF)  # m, of the cubes at their starts and goals
 

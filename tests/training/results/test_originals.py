@@ -43,13 +43,15 @@ def test_the_policy_must_be_of_the_twin():
     for env_id in ("FetchReach-v4", "FetchReach-v2", "FetchReachDense-v4"):
         check_twin(POLICY, env_id)
     check_twin(replace(POLICY, env_id="RigidEnvs/FetchReachDense-v0"), "FetchReach-v4")
-    with pytest.raises(UsageError, match="trained on RigidEnvs/FetchReach-v0, should be one of "
-                       "RigidEnvs/PandaReach-v0 to act in PandaReach-v3"):  # fmt: skip
+    with pytest.raises(UsageError, match="trained on RigidEnvs/FetchReach-v0; only one of "
+                       "RigidEnvs/PandaReach-v0 acts in PandaReach-v3"):  # fmt: skip
         check_twin(POLICY, "PandaReach-v3")
-    with pytest.raises(UsageError, match="trained on RigidEnvs/Push-v0, should be one of"):
+    with pytest.raises(UsageError, match="trained on RigidEnvs/Push-v0; only one of"):
         check_twin(replace(POLICY, env_id="RigidEnvs/Push-v0"), "FetchPush-v4")
-    with pytest.raises(UsageError, match="'HandReach-v3', which has no twin here; there are twins "
-                       "of FetchPickAndPlace-v4, FetchPush-v4"):  # fmt: skip
+    message = (
+        r"has no twin here; did you mean 'PandaReach-v3'\? There are twins of FetchPickAndPlace"
+    )
+    with pytest.raises(UsageError, match=message):
         check_twin(POLICY, "HandReach-v3")
 
 
@@ -90,6 +92,9 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(tmp_path, mo
         UsageError, match=r"a mujoco that Gymnasium-Robotics 1.4.2 can't use.*3.2.7"
     ):
         Originals("FetchReach-v4", 1)
+    worker.write_text("import a_package_that_is_not_there")
+    with pytest.raises(UsageError, match=r"FetchReach-v4 can't run: .* lacks it; run `make twins`"):
+        Originals("FetchReach-v4", 1)
     worker.write_text("")
     with pytest.raises(UsageError, match="ended while it ran FetchReach-v4"):
         Originals("FetchReach-v4", 1)
@@ -98,7 +103,7 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(tmp_path, mo
 def test_the_command_refuses_before_it_starts_anything(capsys):
     words = ["evaluate", "trained", "--env", "RigidEnvs/Push-v0", "--in", "FetchPush-v4"]
     assert cli.main(words) == 2
-    assert "should be one of RigidEnvs/FetchPush-v0" in capsys.readouterr().err
+    assert "only one of RigidEnvs/FetchPush-v0 acts in FetchPush-v4" in capsys.readouterr().err
     assert cli.main([*words, "--fidelity", "fast"]) == 2
     assert "--in has its own environment" in capsys.readouterr().err
     assert sys.executable
